@@ -1,0 +1,198 @@
+"""A board as data: frame layout, channels, nominal scale (config/boards/*.yaml). See docs/file-formats.md."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from vgyro.validation import StrictModel, parse_model
+
+FieldType = Literal["u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u64", "i64", "f32", "f64"]
+TYPE_BYTES: dict[str, int] = {
+    "u8": 1, "i8": 1, "u16": 2, "i16": 2, "u24": 3, "i24": 3, "u32": 4, "i32": 4, "u64": 8, "i64": 8, "f32": 4, "f64": 8,
+}  # fmt: skip
+ByteOrder = Literal["big", "little"]
+
+
+class ChannelField(StrictModel):
+    """One field of a frame; `count` > 1 makes channels name1..nameN, side by side."""
+
+    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
+    type: FieldType
+    at: int | None = Field(None, ge=0, description="byte offset from the first sync byte (binary); text: column order")
+    count: int = Field(1, ge=1)
+    stride: int | None = Field(None, ge=1, description="bytes between two of `count`; null: packed")
+    byte_order: ByteOrder | None = Field(None, description="null: that of the frame")
+
+    def channels(self) -> list[str]:
+        """Names of the channels that this field makes."""
+        return [self.name] if self.count == 1 else [f"{self.name}{index + 1}" for index in range(self.count)]
+
+
+class Checksum(StrictModel):
+    """family `crc` takes width, polynomial, init, reflected, xor_out; `sum` adds bytes modulo 2^width; `xor` for text.
+
+    span : bytes [first, last) that are covered;  at : offset of the stored value (null: the frame's total must be `equals`)
+    pad_to : zero bytes are added to a multiple of this before the CRC is taken
+    """
+
+    family: Literal["crc", "sum", "xor", "none"]
+    width: Literal[8, 16, 32] = 16
+    polynomial: int = 0x1021
+    init: int = 0
+    reflected: bool = False
+    xor_out: int = 0
+    span: tuple[int, int] | None = None
+    at: int | None = None
+    equals: int | None = None
+    pad_to: int = Field(1, ge=1)
+    byte_order: ByteOrder | None = None
+
+    @model_validator(mode="after")
+    def _has_a_place(self) -> Checksum:
+        if self.family in {"crc", "sum"} and (self.span is None or (self.at is None) == (self.equals is None)):
+            raise ValueError(f"a {self.family} checksum needs span, and one of at and equals")
+        return self
+
+
+class BinaryFrame(StrictModel):
+    """Frames of fixed length that begin with sync bytes."""
+
+    kind: Literal["binary"]
+    sync: str = Field(description="hexadecimal bytes, such as EB 90")
+    length: int = Field(ge=2, description="bytes of a whole frame, checksum included")
+    byte_order: ByteOrder = "big"
+    constants: dict[int, str] = Field(default={}, description="offset: hexadecimal bytes that never change")
+    fields: tuple[ChannelField, ...]
+    checksum: Checksum
+
+    @field_validator("sync")
+    @classmethod
+    def _hexadecimal(cls, value: str) -> str:
+        if not bytes.fromhex(value):
+            raise ValueError("sync needs at least one byte")
+        return value
+
+    @model_validator(mode="after")
+    def _fields_fit(self) -> BinaryFrame:
+        for field in self.fields:
+            if field.at is None:
+                raise ValueError(f"field {field.name!r} of a binary frame needs at: (its byte offset)")
+            size = TYPE_BYTES[field.type]
+            end = field.at + (field.count - 1) * (field.stride or size) + size
+            if end > self.length:
+                raise ValueError(f"field {field.name!r} ends at byte {end}, after the frame's {self.length} bytes")
+        return self
+
+
+class TextFrame(StrictModel):
+    """Lines of text: prefix, fields between separators, checksum; fields are read in the order of the list."""
+
+    kind: Literal["text"]
+    prefix: str = ""
+    separator: str = Field(",", description="a space means any run of white space")
+    fields: tuple[ChannelField, ...]
+    checksum: Checksum = Checksum(family="none")
+    require: dict[str, int] = Field(default={}, description="field: value that marks a valid line")
+    max_length: int = Field(256, ge=8, description="a longer line is damage")
+
+
+class Counter(StrictModel):
+    """The frame counter, and where it wraps."""
+
+    field: str
+    modulus: int = Field(ge=2)
+    step: int = Field(1, ge=1, description="increment from one frame to the next")
+
+
+class TimeStamp(StrictModel):
+    """The device's clock, and where it wraps."""
+
+    field: str
+    tick_s: float = Field(gt=0, description="length of a tick, s")
+    wrap: int | None = Field(None, ge=2, description="ticks; null: never")
+
+
+class Adc(StrictModel):
+    """Counts at the two rails; a sample there is clipped. coding as in the frame, before `offset_binary` is removed."""
+
+    low: int
+    high: int
+    coding: Literal["twos_complement", "straight_binary"] = "twos_complement"
+
+
+class Gyro(StrictModel):
+    """One gyro: rate [deg/s] = sign · (count - bias) · scale, along `axis` of the board."""
+
+    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
+    field: str = Field(description="channel that holds it")
+    axis: str = Field(pattern=r"^[A-Za-z0-9_]+$")
+    sign: Literal[1, -1] = 1
+    scale: float = Field(gt=0, description="nominal scale, deg/s a count")
+    bias: float = Field(0.0, description="nominal zero-rate output, counts")
+    range_deg_s: float | None = Field(None, gt=0, description="measuring range, deg/s")
+
+
+class Temperature(StrictModel):
+    """One temperature channel: °C = count · scale + offset."""
+
+    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
+    field: str
+    gyro: str | None = Field(None, description="the gyro it sits in; null: the board")
+    scale: float
+    offset: float
+
+
+class Board(StrictModel):
+    """A board file. Channels that no gyro or temperature names are decoded and kept all the same."""
+
+    name: str
+    title: str
+    source: str = Field("", description="document that gives the layout and the scaling")
+    rate_hz: float = Field(gt=0, description="frames a second, unless a recording says otherwise")
+    baud: int | None = Field(None, gt=0)
+    frame: Annotated[BinaryFrame | TextFrame, Field(discriminator="kind")]
+    counter: Counter | None = None
+    timestamp: TimeStamp | None = None
+    adc: Adc | None = None
+    gyros: tuple[Gyro, ...] = Field(min_length=1)
+    temperatures: tuple[Temperature, ...] = ()
+
+    @property
+    def channels(self) -> list[str]:
+        """Names of all channels of a frame, in the frame's order."""
+        return [channel for field in self.frame.fields for channel in field.channels()]
+
+    @property
+    def axes(self) -> list[str]:
+        """Axes that carry at least one gyro, in the order of the gyros."""
+        return list(dict.fromkeys(gyro.axis for gyro in self.gyros))
+
+    def array(self, axis: str) -> list[Gyro]:
+        """The gyros along one axis: the array that a virtual gyroscope is made of."""
+        return [gyro for gyro in self.gyros if gyro.axis == axis]
+
+    @model_validator(mode="after")
+    def _names_exist(self) -> Board:
+        known = set(self.channels)
+        users = [(f"gyro {g.name!r}", g.field) for g in self.gyros]
+        users += [(f"temperature {t.name!r}", t.field) for t in self.temperatures]
+        users += [("counter", self.counter.field)] if self.counter else []
+        users += [("timestamp", self.timestamp.field)] if self.timestamp else []
+        for user, field in users:
+            if field not in known:
+                raise ValueError(f"{user} names the channel {field!r}, which the frame does not have")
+        names = [gyro.name for gyro in self.gyros]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two gyros are named {name!r}")
+        for temperature in self.temperatures:
+            if temperature.gyro is not None and temperature.gyro not in names:
+                raise ValueError(f"temperature {temperature.name!r} names the gyro {temperature.gyro!r}, which is not there")
+        return self
+
+
+def parse_board(text: str, source: str) -> Board:
+    """Validate the text of a board file.  raises : InvalidFile"""
+    return parse_model(text, Board, source)

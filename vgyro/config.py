@@ -1,0 +1,133 @@
+"""The user's choices: config/config.yaml as a validated model. A manifest may override `analysis` for its data set."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from vgyro.validation import StrictModel, did_you_mean, parse_model
+
+Definition = Literal["level", "demeaned", "difference", "residual"]
+Mode = Literal["in_sample", "causal"]
+CorrelationModel = Literal["dcc", "ccc"]
+Engine = Literal["reference"]
+
+DEFINITIONS: tuple[Definition, ...] = ("level", "demeaned", "difference", "residual")
+MODES: tuple[Mode, ...] = ("in_sample", "causal")
+
+
+class IntegrityOptions(StrictModel):
+    """When is a dump good enough to be analysed?"""
+
+    min_good_share: float = Field(0.5, ge=0, le=1, description="refuse a recording below this share of good frames")
+    max_rate_error: float = Field(0.02, gt=0, description="warn when measured and declared rate differ by more, ratio")
+    stuck_s: float = Field(1.0, gt=0, description="a channel that repeats one count for longer than this is stuck, s")
+    max_clipped_share: float = Field(0.01, ge=0, le=1, description="warn when a larger share of samples is clipped")
+
+
+class RestOptions(StrictModel):
+    """How rest stretches are found in a `free` recording."""
+
+    window_s: float = Field(1.0, gt=0, description="length of the windows that are tested for motion, s")
+    min_duration_s: float = Field(5.0, gt=0, description="a shorter stretch is not counted as rest, s")
+    guard_s: float = Field(0.5, ge=0, description="cut from both ends of each stretch, s")
+    threshold: float = Field(4.0, gt=0, description="motion begins at this multiple of the quiet level")
+
+
+class VolatilityOptions(StrictModel):
+    """Rolling-window ARCH/GARCH/DCC analysis (Liu et al. 2015)."""
+
+    rate_hz: float | Literal["full"] = Field(1.0, description="rate of the analysed series (block means), or full")
+    window: int = Field(360, ge=50, description="samples in a window")
+    step: int = Field(30, ge=1, description="samples between the starts of two windows")
+    definitions: tuple[Definition, ...] = Field(DEFINITIONS, min_length=1, description="what r_t is")
+    modes: tuple[Mode, ...] = Field(MODES, min_length=1, description="in_sample (the paper) and causal")
+    models: tuple[CorrelationModel, ...] = Field(("dcc", "ccc"), min_length=1, description="correlation models")
+    arch_lags: int = Field(1, ge=1, description="lags of the ARCH-LM test")
+    residual_span: int = Field(15, ge=3, description="samples of the first-pass rate estimate that `residual` removes")
+    detrend_span: int = Field(61, ge=5, description="samples of the running mean that `detrended` removes")
+
+    @model_validator(mode="after")
+    def _step_within_window(self) -> VolatilityOptions:
+        if self.step > self.window:
+            raise ValueError(f"step = {self.step} is longer than window = {self.window}: samples would be left out")
+        return self
+
+
+class FusionOptions(StrictModel):
+    """Methods to run, and the parameters of the Kalman filters. A null parameter is estimated from the data."""
+
+    methods: tuple[str, ...] | Literal["all"] = Field("all", description="names of vgyro.fusion.METHODS, or all")
+    bandwidth_hz: float = Field(1.0, gt=0, description="bandwidth that sets q of the Kalman filters, Hz")
+    bandwidth_dynamic_hz: float = Field(5.0, gt=0, description="the same for recordings in motion, Hz")
+    q: float | None = Field(None, gt=0, description="process noise of a recording at rest, deg²/s³; overrides bandwidth_hz")
+    q_dynamic: float | None = Field(None, gt=0, description="the same in motion; overrides bandwidth_dynamic_hz")
+    arw_deg_rt_h: float | None = Field(None, gt=0, description="angle random walk of every gyro, deg/√h; null: measured")
+    tau_s: float = Field(500.0, gt=0, description="time constant of the first-order Markov rate model, s")
+    moment_window_s: float = Field(360.0, gt=0, description="window of the rolling second-moment weights, s")
+    ewma_time_s: float = Field(60.0, gt=0, description="time constant of the exponentially weighted moments, s")
+
+
+class MetricsOptions(StrictModel):
+    """Allan deviation, spectra, intervals."""
+
+    taus_per_octave: int = Field(3, ge=1, le=12, description="points of the Allan curve per octave of τ")
+    confidence: float = Field(0.95, gt=0.5, lt=1, description="confidence of every interval")
+    welch_s: float = Field(100.0, gt=0, description="length of a Welch segment, s")
+    bootstrap: int = Field(500, ge=50, description="replicates of the bootstrap intervals")
+    seed: int = Field(20120207, ge=0, description="seed of the bootstrap")
+
+
+class CrossCheckOptions(StrictModel):
+    """Random windows that are computed again by an independent route."""
+
+    windows: int = Field(5, ge=0, description="windows a recording and axis")
+    seed: int = Field(20150612, ge=0, description="seed of the sample")
+
+
+class Analysis(StrictModel):
+    """Everything that a manifest may override for its data set."""
+
+    engine: Engine = Field("reference", description="who computes: reference (the libraries)")
+    integrity: IntegrityOptions = IntegrityOptions()
+    rest: RestOptions = RestOptions()
+    volatility: VolatilityOptions = VolatilityOptions()
+    fusion: FusionOptions = FusionOptions()
+    metrics: MetricsOptions = MetricsOptions()
+    crosscheck: CrossCheckOptions = CrossCheckOptions()
+
+
+class Config(StrictModel):
+    """config/config.yaml"""
+
+    datasets: tuple[str, ...] | Literal["auto"] = Field("auto", description="data sets to run; auto: every raw/*/dataset.yaml")
+    analysis: Analysis = Analysis()
+
+
+def parse_config(text: str, source: str = "config/config.yaml") -> Config:
+    """Validate the text of config.yaml; an empty file means every default.  raises : InvalidFile"""
+    return parse_model(text if text.strip() else "{}", Config, source)
+
+
+def merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
+    """Return `base` with the keys of `override` put over it, mapping by mapping."""
+    merged = dict(base)
+    for key, value in override.items():
+        nested = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = merge(merged[key], value) if nested else value
+    return merged
+
+
+def override_analysis(analysis: Analysis, override: Analysis | None) -> Analysis:
+    """Return `analysis` with the keys that the manifest sets put over it."""
+    if override is None:
+        return analysis
+    return Analysis.model_validate(merge(analysis.model_dump(), override.model_dump(exclude_unset=True)))
+
+
+def check_methods(options: FusionOptions, known: list[str]) -> None:
+    """Refuse a method name that is not in the registry.  raises : ValueError"""
+    for name in options.methods if options.methods != "all" else ():
+        if name not in known:
+            raise ValueError(f"unknown method {name!r}{did_you_mean(name, known)}")

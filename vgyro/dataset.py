@@ -1,0 +1,162 @@
+"""raw/<dataset>/dataset.yaml as a validated model: which recordings of which board, and what is known of the true rate."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from vgyro.board import Board
+from vgyro.config import Analysis
+from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
+
+Kind = Literal["calibration", "static", "constant", "random", "sinusoid", "thermal", "free"]
+AT_REST: tuple[Kind, ...] = ("static", "thermal")
+
+
+class Plateau(StrictModel):
+    """The table turned at `rate` deg/s from `start` to `stop`, s after the first frame; settling already left out."""
+
+    start: float = Field(ge=0)
+    stop: float
+    rate: float
+
+    @model_validator(mode="after")
+    def _forward(self) -> Plateau:
+        if self.stop <= self.start:
+            raise ValueError(f"stop = {self.stop} s is not after start = {self.start} s")
+        return self
+
+
+class PlateauReference(StrictModel):
+    kind: Literal["plateaus"]
+    plateaus: tuple[Plateau, ...] = Field(min_length=2)
+
+
+class ConstantReference(StrictModel):
+    kind: Literal["constant"]
+    rate: float = Field(description="deg/s")
+
+
+class SinusoidReference(StrictModel):
+    """rate = amplitude · sin(2π·frequency·t + phase); a null phase is fitted to the mean of the array."""
+
+    kind: Literal["sinusoid"]
+    amplitude: float = Field(gt=0, description="deg/s")
+    frequency_hz: float = Field(gt=0)
+    phase_rad: float | None = None
+
+
+class FileReference(StrictModel):
+    """A logged rate: Parquet or CSV with a time column (s, the recording's clock) and a rate column (deg/s)."""
+
+    kind: Literal["file"]
+    file: str
+    time: str = "time"
+    rate: str = "rate"
+
+
+Reference = Annotated[
+    PlateauReference | ConstantReference | SinusoidReference | FileReference, Field(discriminator="kind")
+]
+
+
+class ParquetLog(StrictModel):
+    """An archived log instead of dumps. `columns` maps the board's channels (or gyros) to the log's columns."""
+
+    columns: dict[str, str] = Field(default={}, description="channel or gyro of the board: column of the log")
+    values: Literal["counts", "rates"] = "counts"
+    time: str | None = Field(None, description="column with the time in s; null: row number / rate_hz")
+
+
+class Recording(StrictModel):
+    """One run of the board."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+    kind: Kind
+    files: tuple[str, ...] = Field(min_length=1, description="dumps in order, or a Parquet file or folder; globs allowed")
+    parquet: ParquetLog | None = Field(None, description="set: the files are Parquet logs")
+    rate_hz: float | None = Field(None, gt=0, description="null: the board's")
+    rest: tuple[tuple[float, float], ...] | Literal["auto"] = Field(
+        "auto", description="known standstill, [start, stop] in s; auto: all of a static recording, found in a free one"
+    )
+    reference: Reference | None = None
+    axis: str | None = Field(None, description="the axis that the reference turns about; null: the board's only one")
+
+    @field_validator("files", mode="before")
+    @classmethod
+    def _one_or_many(cls, value: object) -> object:
+        return (value,) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _reference_fits(self) -> Recording:
+        if self.kind == "calibration" and not isinstance(self.reference, PlateauReference | FileReference):
+            raise ValueError("a calibration recording needs a reference of kind plateaus or file")
+        if self.kind in AT_REST and self.reference is not None:
+            raise ValueError(f"a {self.kind} recording stands still: it takes no reference")
+        return self
+
+
+class Manifest(StrictModel):
+    """raw/<dataset>/dataset.yaml"""
+
+    board: str = Field(description="name of a file in config/boards, or a path to one, from the manifest's folder")
+    title: str = ""
+    simulated: bool = Field(False, description="true: every page says so")
+    twin: str | None = Field(None, description="the twin that made the data, where it is simulated")
+    folder: str = Field(".", description="where the files are, from the manifest's folder")
+    gyros: tuple[str, ...] | Literal["all"] = Field("all", description="gyros to use")
+    latitude_deg: float | None = Field(None, ge=-90, le=90, description="for the Earth rate on a vertical axis")
+    notes: str = ""
+    recordings: tuple[Recording, ...] = Field(min_length=1)
+    analysis: Analysis | None = Field(None, description="keys of config.yaml's `analysis` to override")
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> Manifest:
+        names = [recording.name for recording in self.recordings]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two recordings are named {name!r}")
+        return self
+
+    def recording(self, name: str) -> Recording:
+        """The recording of that name."""
+        return next(recording for recording in self.recordings if recording.name == name)
+
+
+def parse_manifest(text: str, source: str) -> Manifest:
+    """Validate the text of a dataset.yaml.  raises : InvalidFile"""
+    return parse_model(text, Manifest, source)
+
+
+def used_board(manifest: Manifest, board: Board) -> Board:
+    """The board with only the gyros that the manifest uses."""
+    if manifest.gyros == "all":
+        return board
+    kept = tuple(gyro for gyro in board.gyros if gyro.name in manifest.gyros)
+    names = {gyro.name for gyro in kept}
+    temperatures = tuple(t for t in board.temperatures if t.gyro is None or t.gyro in names)
+    return board.model_copy(update={"gyros": kept, "temperatures": temperatures})
+
+
+def check_against_board(manifest: Manifest, board: Board, source: str) -> list[Problem]:
+    """Mistakes that only show when manifest and board are read together."""
+    problems = []
+    names = [gyro.name for gyro in board.gyros]
+    for name in manifest.gyros if manifest.gyros != "all" else ():
+        if name not in names:
+            problems.append(Problem(source, 1, "gyros", f"board {board.name!r} has no gyro {name!r}{did_you_mean(name, names)}"))
+    axes = used_board(manifest, board).axes
+    for index, recording in enumerate(manifest.recordings):
+        key = f"recordings.{index}"
+        if recording.axis is not None and recording.axis not in axes:
+            problems.append(Problem(source, 1, f"{key}.axis", f"{recording.axis!r} is not one of {', '.join(axes)}"))
+        if recording.reference is not None and recording.axis is None and len(axes) > 1:
+            problems.append(Problem(source, 1, key, f"says no axis for its reference; the board has {', '.join(axes)}"))
+        if recording.parquet is not None:
+            known = [*board.channels, *names]
+            for channel in recording.parquet.columns:
+                if channel not in known:
+                    message = f"board {board.name!r} has no channel {channel!r}{did_you_mean(channel, known)}"
+                    problems.append(Problem(source, 1, f"{key}.parquet.columns", message))
+    return problems

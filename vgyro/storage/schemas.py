@@ -1,0 +1,186 @@
+"""What every Parquet artefact holds: columns, units, meaning. docs/file-formats.md is written from this file.
+
+A column name may hold a placeholder: {gyro}, {channel}, {temperature} or {method} stands for every name of that sort.
+The first column that fits a name describes it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Column:
+    """unit : "1" for a pure number, "" where a unit makes no sense (names, flags)"""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Schema:
+    """One kind of table."""
+
+    name: str
+    version: int
+    meaning: str
+    columns: tuple[Column, ...]
+
+
+_TIME = Column("time", "s", "since the first frame of the recording")
+_SEGMENT = Column("segment", "", "number of the gap-free stretch, from 0")
+_WINDOW = (
+    Column("window", "", "number of the window, from 0"),
+    Column("start", "", "first sample of the window in the volatility series"),
+    Column("stop", "", "one past the last sample"),
+    Column("time_start", "s", "time of the first sample"),
+    Column("time_stop", "s", "time of the last sample"),
+)
+
+_ALL = (
+    Schema("frames", 1, "decoded frames of one recording", (
+        Column("counter", "", "frame counter without its wraps; row number where the board has none"),
+        _TIME, _SEGMENT,
+        Column("{channel}", "count", "value of a channel as sent, or deg/s for a log that holds rates"),
+    )),
+    Schema("rates", 1, "calibrated rates of one recording", (
+        _TIME, _SEGMENT,
+        Column("at_rest", "", "true where the board is known to stand still"),
+        Column("reference", "deg/s", "true rate, where it is known"),
+        Column("temp_{temperature}", "°C", "temperature channel"),
+        Column("{gyro}", "deg/s", "rate along the gyro's axis"),
+    )),
+    Schema("arch_lm", 1, "Engle's test for ARCH effects", (
+        Column("gyro", "", "gyro"),
+        Column("series", "", "level, detrended or standardised"),
+        Column("lags", "", "lagged squares in the regression"),
+        Column("samples", "", "samples of the series"),
+        Column("statistic", "1", "LM statistic; NaN where it is not defined"),
+        Column("p_value", "1", "probability under chi² with `lags` degrees of freedom"),
+        Column("kurtosis", "1", "kurtosis, 3 for a Gaussian"),
+        Column("status", "", "ok, too short, no variance"),
+    )),
+    Schema("garch", 1, "GARCH(1,1) of each gyro in each window", (
+        *_WINDOW,
+        Column("gyro", "", "gyro"),
+        Column("omega", "(deg/s)²", "constant α0"),
+        Column("alpha", "1", "weight of the last squared value"),
+        Column("beta", "1", "weight of the last variance"),
+        Column("se_omega", "(deg/s)²", "robust standard error"),
+        Column("se_alpha", "1", "robust standard error"),
+        Column("se_beta", "1", "robust standard error"),
+        Column("log_likelihood", "1", "Gaussian log-likelihood of the window"),
+        Column("status", "", "converged, boundary, no variance, too short, failed"),
+    )),
+    Schema("dcc", 1, "DCC(1,1) and constant-correlation test of each window, and of the whole record (window = -1)", (
+        *_WINDOW,
+        Column("a", "1", "weight of the last outer product"),
+        Column("b", "1", "weight of the last Q"),
+        Column("se_a", "1", "two-step robust standard error"),
+        Column("se_b", "1", "two-step robust standard error"),
+        Column("se_a_hessian", "1", "inverse-Hessian standard error, which is too small"),
+        Column("se_b_hessian", "1", "inverse-Hessian standard error, which is too small"),
+        Column("log_likelihood", "1", "correlation part of the log-likelihood, DCC"),
+        Column("log_likelihood_ccc", "1", "the same with a = b = 0"),
+        Column("target", "1", "rows of S above the diagonal, as a list"),
+        Column("statistic", "1", "constant-correlation test"),
+        Column("p_value", "1", "its probability under chi²(s + 1)"),
+        Column("p_value_s", "1", "its probability under chi²(s)"),
+        Column("status", "", "converged, boundary, not positive definite, one gyro, failed"),
+    )),
+    Schema("weights", 1, "weights of one model and mode, one row a sample of the volatility series", (
+        _TIME, _SEGMENT,
+        Column("model", "", "dcc or ccc"),
+        Column("mode", "", "in_sample or causal"),
+        Column("sigma", "deg/s", "conditional standard deviation of the fused rate, √(w'Hw)"),
+        Column("w_{gyro}", "1", "weight of the gyro"),
+        Column("sd_{gyro}", "deg/s", "conditional standard deviation of the gyro, √h"),
+        Column("status", "", "ok, or why the weights are equal"),
+    )),
+    Schema("fused", 1, "one column a method", (
+        _TIME, _SEGMENT,
+        Column("{method}", "deg/s", "virtual gyroscope of that method"),
+    )),
+    Schema("methods", 1, "what ran, and what it is", (
+        Column("method", "", "name in vgyro.fusion.METHODS"),
+        Column("definition", "", "definition of r_t where the method has one"),
+        Column("column", "", "column in fused.parquet; empty where the method could not run"),
+        Column("title", "", "name for people"),
+        Column("source", "", "paper and equation"),
+        Column("causal", "", "true if sample t uses nothing later than t"),
+        Column("dc_gain", "1", "gain for a constant rate"),
+        Column("bandwidth_hz", "Hz", "-3 dB bandwidth; NaN: not limited by the method"),
+        Column("noise_bandwidth_hz", "Hz", "noise-equivalent bandwidth, one-sided; NaN: not limited"),
+        Column("delay_s", "s", "delay at low frequency"),
+        Column("note", "", "what was inferred, or why it could not run"),
+    )),
+    Schema("allan", 1, "overlapping Allan deviation of every series", (
+        Column("series", "", "gyro, or column of fused.parquet"),
+        Column("tau", "s", "averaging time"),
+        Column("deviation", "deg/s", "Allan deviation"),
+        Column("low", "deg/s", "lower confidence limit, chi²"),
+        Column("high", "deg/s", "upper confidence limit, chi²"),
+        Column("edf", "1", "equivalent degrees of freedom"),
+    )),
+    Schema("spectrum", 1, "Welch density of every series", (
+        Column("series", "", "gyro, or column of fused.parquet"),
+        Column("frequency", "Hz", "frequency"),
+        Column("density", "deg/s/√Hz", "amplitude density, ONE-sided"),
+    )),
+    Schema("correlation", 1, "correlation matrix of the gyros' noise (Jiang et al. 2012, eq. 22)", (
+        Column("gyro", "", "row"),
+        Column("other", "", "column"),
+        Column("correlation", "1", "correlation factor"),
+        Column("low", "1", "lower confidence limit"),
+        Column("high", "1", "upper confidence limit"),
+    )),
+    Schema("metrics", 1, "every figure, long", (
+        Column("recording", "", "recording"),
+        Column("axis", "", "axis of the array"),
+        Column("method", "", "gyro, or name in vgyro.fusion.METHODS"),
+        Column("definition", "", "definition of r_t where the method has one, else empty"),
+        Column("metric", "", "name of the figure (vgyro.metrics.FIGURES)"),
+        Column("value", "see unit", "the figure"),
+        Column("low", "see unit", "lower 95 % limit; NaN where none is given"),
+        Column("high", "see unit", "upper 95 % limit; NaN where none is given"),
+        Column("unit", "", "unit of value, low and high"),
+        Column("note", "", "what to know before using it"),
+    )),
+    Schema("crosscheck", 1, "sampled results computed again by an independent route", (
+        Column("check", "", "what was compared"),
+        Column("against", "", "the independent route"),
+        Column("window", "", "window, -1 for a whole recording"),
+        Column("series", "", "gyro or method"),
+        Column("ours", "see unit", "our figure"),
+        Column("theirs", "see unit", "the figure of the independent route"),
+        Column("difference", "see unit", "ours - theirs"),
+        Column("tolerance", "see unit", "largest difference that passes"),
+        Column("unit", "", "unit of the four figures"),
+        Column("passed", "", "true if |difference| <= tolerance"),
+    )),
+    Schema("truth", 1, "what a simulated recording really was", (
+        _TIME,
+        Column("reference", "deg/s", "true rate"),
+        Column("bias_{gyro}", "deg/s", "slowly varying error of the gyro"),
+        Column("sd_{gyro}", "deg/s", "standard deviation of the white part of its noise"),
+        Column("fault_{gyro}", "", "true while a fault is active"),
+        Column("temp_{temperature}", "°C", "true temperature"),
+    )),
+)  # fmt: skip
+
+SCHEMAS = {schema.name: schema for schema in _ALL}
+
+
+def units_of(schema: str, names: list[str]) -> dict[str, str]:
+    """Unit of each column.  raises : KeyError if the schema declares no such column"""
+    return {name: _declared(SCHEMAS[schema], name).unit for name in names}
+
+
+def _declared(schema: Schema, name: str) -> Column:
+    for column in schema.columns:
+        pattern = re.sub(r"\\{\w+\\}", r".+", re.escape(column.name))
+        if re.fullmatch(pattern, name):
+            return column
+    raise KeyError(f"schema {schema.name!r} declares no column {name!r}")
