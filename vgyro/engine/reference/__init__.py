@@ -1,0 +1,24 @@
+"""The reference engine: the libraries that users already trust.
+
+garch   : GARCH by arch
+dcc     : DCC, its two-step standard errors and its test by pymgarch
+weights : constrained minimum-variance weights by cvxpy
+allan   : Allan deviation by allantools
+kalman  : filters by filterpy
+
+Each is a module, loaded at first use: `vgyro.engine.get("reference").garch.fit_garch(...)`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+MODULES = ("garch", "dcc", "weights", "allan", "kalman")
+
+
+def __getattr__(name: str) -> ModuleType:
+    # The libraries take seconds to import: a job pays only for those that it uses.
+    if name in MODULES:
+        return import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
