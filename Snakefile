@@ -1,0 +1,55 @@
+# vgyro: from the dumps in raw/ to the pages in reports/.   snakemake --cores 2   |   snakemake --cores 2 papers
+#
+# Each data set is raw/<dataset>/dataset.yaml. The stages, one file each in workflow/rules/:
+#   decode → screen → calibrate → convert → noise → volatility (garch, dcc, arch_lm, weights) → fuse → measure
+#   → crosscheck → report → verdict;   simulate → papers regenerates the tables of the two papers.
+
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+# Satisfied by the environment that `make` builds; a container image is not needed.
+container: None
+
+
+include: "workflow/rules/common.smk"
+
+
+wildcard_constraints:
+    dataset="|".join(DATASETS) or "none",
+    recording="[A-Za-z0-9][A-Za-z0-9_-]*",
+    axis="[A-Za-z0-9_]+",
+    definition="level|demeaned|difference|residual",
+    paper="|".join(PAPERS),
+
+
+localrules:
+    all,
+    papers,
+
+
+rule all:
+    input:
+        "reports/index.html",
+        "results/verdict.json",
+
+
+rule papers:
+    input:
+        expand("reports/papers/{paper}.html", paper=PAPERS),
+
+
+include: "workflow/rules/simulate.smk"
+include: "workflow/rules/decode.smk"
+include: "workflow/rules/calibrate.smk"
+include: "workflow/rules/volatility.smk"
+include: "workflow/rules/fuse.smk"
+include: "workflow/rules/measure.smk"
+include: "workflow/rules/report.smk"
+include: "workflow/rules/papers.smk"
+
+
+onerror:
+    # One bad data set must not take the overview of the others away.
+    shell(index_command())

@@ -1,0 +1,67 @@
+rule calibrate:
+    """Scale factor and bias of every gyro, from the rate-table recordings; nominal where there are none."""
+    input:
+        frames=calibration_frames,
+        integrity=calibration_integrity,
+        references=calibration_references,
+    output:
+        calibration="results/{dataset}/calibration.json",
+    log:
+        "results/logs/{dataset}/calibrate.log",
+    benchmark:
+        "results/benchmarks/{dataset}/calibrate.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    params:
+        options=stage("manifest", "board"),
+        code=code("calibrate"),
+    shell:
+        RUN + "calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"
+        " --input references {input.references:q} --output calibration {output.calibration}"
+        " --options {params.options:q} --code {params.code} --log {log}"
+
+
+rule convert:
+    """Counts to deg/s, with the stretches at rest and the true rate where it is known."""
+    input:
+        frames="results/{dataset}/{recording}/frames.parquet",
+        calibration="results/{dataset}/calibration.json",
+        reference=reference_file,
+    output:
+        rates="results/{dataset}/{recording}/rates.parquet",
+    log:
+        "results/logs/{dataset}/{recording}/convert.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/convert.tsv"
+    resources:
+        mem_mb=3000,
+        runtime=20,
+    params:
+        options=stage("manifest", "board", "rest"),
+        code=code("convert"),
+    shell:
+        RUN + "convert --input frames {input.frames} --input calibration {input.calibration}"
+        " --input reference {input.reference:q} --output rates {output.rates}"
+        " --options {params.options:q} --code {params.code} --log {log}"
+
+
+rule noise:
+    """White noise, random walk and correlation of an axis' gyros: what the filters are designed from."""
+    input:
+        rates=noise_source,
+    output:
+        noise="results/{dataset}/noise/{axis}.json",
+    log:
+        "results/logs/{dataset}/noise/{axis}.log",
+    benchmark:
+        "results/benchmarks/{dataset}/noise/{axis}.tsv"
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        options=stage("board", "metrics"),
+        code=code("noise"),
+    shell:
+        RUN + "noise --input rates {input.rates} --output noise {output.noise}"
+        " --options {params.options:q} --code {params.code} --log {log}"

@@ -1,0 +1,213 @@
+"""What the rules share: the data sets, the options each stage uses, and where files are."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+
+from vgyro.config import override_analysis
+from vgyro.dataset import AT_REST
+from vgyro.storage.inputs import data_files
+from vgyro.tasks.closure import code_hash
+from vgyro.tasks.inputs_check import load_datasets, load_twins
+
+PAPERS = ("jiang2012", "liu2015")
+RUN = "python -m vgyro.tasks."
+
+# One thread a job: Snakemake places the jobs on the cores, and one thread gives the same bytes everywhere.
+shell.prefix("export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1; ")
+
+LOADED = load_datasets("config/config.yaml", "raw", "config/boards")
+TWINS = load_twins(PAPERS, "config/twins", "results/twins", "config/boards")
+DATASETS = {**LOADED.datasets, **TWINS}
+PROBLEMS = [str(problem) for problem in LOADED.problems]
+for _problem in PROBLEMS:
+    print(f"vgyro: {_problem}", file=sys.stderr)
+
+
+def code(task):
+    """Hash of all code that a task can reach: a change there re-runs its jobs, and no others."""
+    return code_hash(f"vgyro.tasks.{task}")
+
+
+def analysis_of(dataset):
+    """The analysis options of a data set: config.yaml with the manifest's overrides."""
+    return override_analysis(LOADED.config.analysis, DATASETS[dataset].manifest.analysis)
+
+
+def stage(*sections, **values):
+    """Options of a stage's jobs, as JSON: the sections that it uses, its wildcards, and what else is given."""
+
+    def options(wildcards):
+        known = DATASETS[wildcards.dataset]
+        record = {**values, **dict(wildcards.items()), "analysis": {}}
+        if "recording" in record:
+            record["kind"] = kind_of(wildcards.dataset, wildcards.recording)
+        for section in sections:
+            if section in ("manifest", "board"):
+                record[section] = getattr(known, section).model_dump(mode="json")
+            else:
+                record["analysis"][section] = analysis_of(wildcards.dataset).model_dump(mode="json")[section]
+        return json.dumps(record, sort_keys=True)
+
+    return options
+
+
+def files_of(dataset, recording):
+    """All files that the manifest names for a recording, there or not."""
+    return [str(path) for path in data_files(DATASETS[dataset].manifest, recording, DATASETS[dataset].folder)]
+
+
+def made_here(dataset, path):
+    """True for a file that the rule `simulate` makes."""
+    return dataset in TWINS and path.startswith("results/twins/")
+
+
+def named_files(wildcards):
+    """All files of a recording, for the command line of decode."""
+    return files_of(wildcards.dataset, wildcards.recording)
+
+
+def existing_files(wildcards):
+    """The files of a recording that can be an input; decode refuses a recording whose files are missing."""
+    paths = files_of(wildcards.dataset, wildcards.recording)
+    return [path for path in paths if made_here(wildcards.dataset, path) or Path(path).exists()]
+
+
+def recordings(dataset, *kinds):
+    """Names of the recordings of some kinds; of all kinds if none is given."""
+    found = DATASETS[dataset].manifest.recordings
+    return [recording.name for recording in found if not kinds or recording.kind in kinds]
+
+
+def kind_of(dataset, recording):
+    """Kind of a recording."""
+    return DATASETS[dataset].manifest.recording(recording).kind
+
+
+def screened(dataset):
+    """What `screen` wrote of a data set: which recordings can be used, and how long they are."""
+    return json.loads(Path(checkpoints.screen.get(dataset=dataset).output.screen).read_text(encoding="utf-8"))
+
+
+def usable(dataset):
+    """Recordings, calibration runs left out, that decode did not refuse."""
+    known = screened(dataset)["recordings"]
+    return [name for name in known if known[name]["usable"] and kind_of(dataset, name) != "calibration"]
+
+
+def has_volatility(dataset, recording):
+    """True if the recording can hold a rolling window; a free one may, and finds out."""
+    chosen = analysis_of(dataset).volatility
+    if kind_of(dataset, recording) in (*AT_REST, "free"):
+        return True
+    about = screened(dataset)["recordings"][recording]
+    rate = about["rate_hz"] if chosen.rate_hz == "full" else chosen.rate_hz
+    return about["duration_s"] * rate >= chosen.window
+
+
+def definitions(dataset):
+    """Definitions of r_t that the analysis uses."""
+    return analysis_of(dataset).volatility.definitions
+
+
+def weights_of(wildcards):
+    """Weights of every definition, for a recording that can hold a window."""
+    if not has_volatility(wildcards.dataset, wildcards.recording):
+        return []
+    folder = f"results/{wildcards.dataset}/{wildcards.recording}/{wildcards.axis}"
+    return [f"{folder}/{definition}/weights.parquet" for definition in definitions(wildcards.dataset)]
+
+
+def tables_of(wildcards, table):
+    """One table of the volatility stage for every definition."""
+    return [path.replace("weights.parquet", f"{table}.parquet") for path in weights_of(wildcards)]
+
+
+def garch_of(wildcards):
+    """GARCH fits of every definition."""
+    return tables_of(wildcards, "garch")
+
+
+def dcc_of(wildcards):
+    """DCC fits of every definition."""
+    return tables_of(wildcards, "dcc")
+
+
+def all_integrity(wildcards):
+    """Integrity record of every recording of a data set."""
+    return [f"results/{wildcards.dataset}/{name}/integrity.json" for name in recordings(wildcards.dataset)]
+
+
+def all_noise(wildcards):
+    """Noise of every axis; none if no recording can be used."""
+    axes = DATASETS[wildcards.dataset].board.axes if usable(wildcards.dataset) else []
+    return [f"results/{wildcards.dataset}/noise/{axis}.json" for axis in axes]
+
+
+def calibration_frames(wildcards):
+    """Frames of the calibration recordings."""
+    return [f"results/{wildcards.dataset}/{name}/frames.parquet" for name in recordings(wildcards.dataset, "calibration")]
+
+
+def calibration_integrity(wildcards):
+    """Integrity records of the calibration recordings."""
+    return [path.replace("frames.parquet", "integrity.json") for path in calibration_frames(wildcards)]
+
+
+def calibration_references(wildcards):
+    """Logged table rates of the calibration recordings that have one."""
+    known = DATASETS[wildcards.dataset].manifest
+    return [
+        path
+        for name in recordings(wildcards.dataset, "calibration")
+        for path in reference_path(wildcards.dataset, known.recording(name))
+    ]
+
+
+def noise_source(wildcards):
+    """Rates of the recording that tells each gyro's noise: at rest if there is one, else the longest."""
+    names = usable(wildcards.dataset)
+    order = {kind: rank for rank, kind in enumerate(("static", "thermal", "free"))}
+    about = screened(wildcards.dataset)["recordings"]
+    names.sort(key=lambda name: (order.get(kind_of(wildcards.dataset, name), len(order)), -about[name]["duration_s"]))
+    return [f"results/{wildcards.dataset}/{name}/rates.parquet" for name in names[:1]]
+
+
+def reference_path(dataset, recording):
+    """The logged true rate of a recording, where there is one."""
+    known = DATASETS[dataset]
+    if recording.reference is None or recording.reference.kind != "file":
+        return []
+    return [str(known.folder / known.manifest.folder / recording.reference.file)]
+
+
+def reference_file(wildcards):
+    """The logged true rate of the job's recording, where there is one."""
+    return reference_path(wildcards.dataset, DATASETS[wildcards.dataset].manifest.recording(wildcards.recording))
+
+
+def artefacts_of(wildcards):
+    """Every artefact that the page of a data set shows."""
+    dataset = wildcards.dataset
+    paths = []
+    for recording in usable(dataset):
+        paths.append(f"results/{dataset}/{recording}/rates.parquet")
+        for axis in DATASETS[dataset].board.axes:
+            folder = f"results/{dataset}/{recording}/{axis}"
+            tables = ("allan", "spectrum", "metrics", "correlation", "fused", "methods", "crosscheck")
+            paths += [f"{folder}/{table}.parquet" for table in tables]
+            if has_volatility(dataset, recording):
+                parts = ("arch_lm", "garch", "dcc", "weights")
+                paths += [f"{folder}/{name}/{part}.parquet" for name in definitions(dataset) for part in parts]
+    return paths
+
+
+def index_command():
+    """Command that writes the overview from the headlines that exist."""
+    headlines = [f"results/{name}/headline.json" for name in LOADED.datasets]
+    there = [path for path in headlines if Path(path).exists()]
+    return " ".join(
+        [f"{RUN}index --input headlines", *map(shlex.quote, there), "--output page reports/index.html"]
+        + ["--options", shlex.quote(json.dumps({"problems": PROBLEMS})), "--log results/logs/index.log"]
+    )

@@ -1,0 +1,55 @@
+rule measure:
+    """Allan deviations, densities, correlation and every figure, with intervals."""
+    input:
+        rates="results/{dataset}/{recording}/rates.parquet",
+        fused="results/{dataset}/{recording}/{axis}/fused.parquet",
+        methods="results/{dataset}/{recording}/{axis}/methods.parquet",
+    output:
+        allan="results/{dataset}/{recording}/{axis}/allan.parquet",
+        spectrum="results/{dataset}/{recording}/{axis}/spectrum.parquet",
+        metrics="results/{dataset}/{recording}/{axis}/metrics.parquet",
+        correlation="results/{dataset}/{recording}/{axis}/correlation.parquet",
+    log:
+        "results/logs/{dataset}/{recording}/{axis}/measure.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/{axis}/measure.tsv"
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        options=stage("board", "engine", "metrics"),
+        code=code("measure"),
+    shell:
+        RUN + "measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods}"
+        " --output allan {output.allan} --output spectrum {output.spectrum} --output metrics {output.metrics} --output correlation {output.correlation}"
+        " --options {params.options:q} --code {params.code} --log {log}"
+
+
+rule crosscheck:
+    """A random sample of the results, computed again by an independent route."""
+    input:
+        rates="results/{dataset}/{recording}/rates.parquet",
+        noise="results/{dataset}/noise/{axis}.json",
+        fused="results/{dataset}/{recording}/{axis}/fused.parquet",
+        methods="results/{dataset}/{recording}/{axis}/methods.parquet",
+        allan="results/{dataset}/{recording}/{axis}/allan.parquet",
+        garch=garch_of,
+        dcc=dcc_of,
+        weights=weights_of,
+    output:
+        crosscheck="results/{dataset}/{recording}/{axis}/crosscheck.parquet",
+    log:
+        "results/logs/{dataset}/{recording}/{axis}/crosscheck.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/{axis}/crosscheck.tsv"
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        options=stage("board", "engine", "volatility", "fusion", "metrics", "crosscheck"),
+        code=code("crosscheck"),
+    shell:
+        RUN + "crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
+        " --output crosscheck {output.crosscheck}"
+        " --options {params.options:q} --code {params.code} --log {log}"
+
