@@ -1,4 +1,4 @@
-"""raw/<dataset>/dataset.yaml as a validated model: which recordings of which board, and what is known of the true rate."""
+"""raw/<dataset>/dataset.yaml as a validated model: recordings of a board, and what is known of the true rate."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from vgyro.board import Board
-from vgyro.config import Analysis
+from vgyro.config import PARTIAL, Analysis
 from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
 
 Kind = Literal["calibration", "static", "constant", "random", "sinusoid", "thermal", "free"]
@@ -74,7 +74,7 @@ class Recording(StrictModel):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
     kind: Kind
-    files: tuple[str, ...] = Field(min_length=1, description="dumps in order, or a Parquet file or folder; globs allowed")
+    files: tuple[str, ...] = Field(min_length=1, description="dumps in order, or a Parquet file or folder; globs too")
     parquet: ParquetLog | None = Field(None, description="set: the files are Parquet logs")
     rate_hz: float | None = Field(None, gt=0, description="null: the board's")
     rest: tuple[tuple[float, float], ...] | Literal["auto"] = Field(
@@ -126,7 +126,7 @@ class Manifest(StrictModel):
 
 def parse_manifest(text: str, source: str) -> Manifest:
     """Validate the text of a dataset.yaml.  raises : InvalidFile"""
-    return parse_model(text, Manifest, source)
+    return parse_model(text, Manifest, source, {PARTIAL: True})
 
 
 def used_board(manifest: Manifest, board: Board) -> Board:
@@ -145,7 +145,9 @@ def check_against_board(manifest: Manifest, board: Board, source: str) -> list[P
     names = [gyro.name for gyro in board.gyros]
     for name in manifest.gyros if manifest.gyros != "all" else ():
         if name not in names:
-            problems.append(Problem(source, 1, "gyros", f"board {board.name!r} has no gyro {name!r}{did_you_mean(name, names)}"))
+            problems.append(
+                Problem(source, 1, "gyros", f"board {board.name!r} has no gyro {name!r}{did_you_mean(name, names)}")
+            )
     axes = used_board(manifest, board).axes
     for index, recording in enumerate(manifest.recordings):
         key = f"recordings.{index}"

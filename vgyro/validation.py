@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from vgyro import complaints
+from vgyro.complaints import did_you_mean as did_you_mean
 from vgyro.errors import ConfigError
 
 Model = TypeVar("Model", bound="StrictModel")
@@ -52,20 +54,22 @@ class InvalidFile(ConfigError):
         return type(self), (self.problems,)
 
 
-def parse_model(text: str, model: type[Model], source: str) -> Model:
+def parse_model(text: str, model: type[Model], source: str, context: Mapping[str, Any] | None = None) -> Model:
     """Parse `text` as YAML and validate it against `model`.
 
-    source : the name that messages give to the text, a path as the user would type it
-    raises : InvalidFile, with every mistake at once
+    source  : the name that messages give to the text, a path as the user would type it
+    context : handed to the model's validators
+    raises  : InvalidFile, with every mistake at once
     """
     data, lines = parse_yaml(text, source)
     if not isinstance(data, dict):
         raise InvalidFile([Problem(source, 1, "", "expected keys and values (a YAML mapping)")])
     try:
-        return model.model_validate(data)
+        return model.model_validate(data, context=dict(context or {}))
     except ValidationError as error:
-        problems = [_problem(entry, model, lines, source) for entry in error.errors()]
-        raise InvalidFile(sorted(problems, key=lambda problem: problem.line)) from None
+        found = complaints.of_errors(error.errors(include_url=False), data, model)
+    problems = [Problem(source, _line_of(path, lines), _dotted(path), message) for path, message in found]
+    raise InvalidFile(sorted(problems, key=lambda problem: problem.line))
 
 
 def parse_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
@@ -77,6 +81,9 @@ def parse_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
         mark = getattr(error, "problem_mark", None)
         reason = getattr(error, "problem", None) or "not readable as YAML"
         raise InvalidFile([Problem(source, mark.line + 1 if mark else 1, "", f"not valid YAML: {reason}")]) from None
+    except ValueError as error:
+        # PyYAML's own conversion of dates and numbers, such as 2026-13-45.
+        raise InvalidFile([Problem(source, 1, "", f"not valid YAML: {error}")]) from None
     lines: dict[Path, int] = {(): 1}
     problems: list[Problem] = []
     if node is not None:
@@ -84,6 +91,19 @@ def parse_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
     if problems:
         raise InvalidFile(problems)
     return data, lines
+
+
+def locate(problems: Iterable[Problem], text: str) -> list[Problem]:
+    """Give each problem the line of its key in `text`, and sort them by line; for checks made after parsing.
+
+    A key that is not written in the text takes the line of the nearest one above it.
+    """
+    found = list(problems)
+    if not found:
+        return []
+    _, lines = parse_yaml(text, found[0].source)
+    placed = [replace(problem, line=_line_of(_path(problem.key), lines)) for problem in found]
+    return sorted(placed, key=lambda problem: problem.line)
 
 
 def _collect_lines(node: yaml.Node, path: Path, lines: dict[Path, int], problems: list[Problem], source: str) -> None:
@@ -103,64 +123,15 @@ def _collect_lines(node: yaml.Node, path: Path, lines: dict[Path, int], problems
             _collect_lines(value, (*path, index), lines, problems, source)
 
 
-def _problem(entry: Any, model: type[BaseModel], lines: dict[Path, int], source: str) -> Problem:
-    # Pydantic adds the name of a union's branch to the path; only steps that exist in the file are kept.
-    path: Path = ()
-    for step in entry["loc"]:
-        if (*path, step) in lines or (step == entry["loc"][-1] and entry["type"] == "missing"):
-            path = (*path, step)
-    line = _line_of(path, lines)
-    message = _message(entry)
-    if entry["type"] == "extra_forbidden":
-        message = "unknown key" + did_you_mean(str(entry["loc"][-1]), _known_keys(model, entry["loc"][:-1]))
-    return Problem(source, line, _dotted(path), message)
-
-
-def _message(entry: Any) -> str:
-    if entry["type"] == "missing":
-        return "missing; this key is required"
-    text = str(entry["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
-    text = text[0].lower() + text[1:]
-    value = entry.get("input")
-    if entry["type"] in {"value_error", "union_tag_invalid"} or isinstance(value, dict | list):
-        return text
-    return f"{text}, found {value!r}"
-
-
 def _line_of(path: Path, lines: dict[Path, int]) -> int:
     while path and path not in lines:
         path = path[:-1]
     return lines[path]
 
 
+def _path(key: str) -> Path:
+    return tuple(int(step) if step.isdecimal() else step for step in key.split(".")) if key else ()
+
+
 def _dotted(path: Path) -> str:
     return ".".join(str(step) for step in path)
-
-
-def did_you_mean(word: str, known: list[str]) -> str:
-    """Return "; did you mean …?" if a known word is near, else the list of known words."""
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; known keys: {', '.join(known)}" if known else ""
-
-
-def _known_keys(model: type[BaseModel], steps: tuple[str | int, ...]) -> list[str]:
-    """Field names of the (sub)model at `steps`, following fields, lists, mappings and unions."""
-    candidates: list[Any] = [model]
-    for step in steps:
-        following: list[Any] = []
-        for candidate in candidates:
-            if isinstance(step, str) and step in getattr(candidate, "model_fields", {}):
-                following += _models_in(candidate.model_fields[step].annotation)
-            else:
-                following.append(candidate)
-        candidates = following
-    names = [name for candidate in candidates for name in getattr(candidate, "model_fields", {})]
-    return list(dict.fromkeys(names))
-
-
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [found for argument in getattr(annotation, "__args__", ()) for found in _models_in(argument)]

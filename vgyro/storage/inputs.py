@@ -54,13 +54,18 @@ def read_dataset(path: str | Path, boards: Path = BOARDS) -> tuple[Manifest, Boa
 
 
 def data_files(manifest: Manifest, recording: str, folder: Path) -> list[Path]:
-    """The files of a recording, globs expanded, in the order of the manifest; a pattern without a file stays as it is."""
+    """The files of a recording, globs expanded, in the manifest's order; a pattern without a file stays."""
     base = folder / Path(manifest.folder).expanduser()
     found: list[Path] = []
     for pattern in manifest.recording(recording).files:
-        matches = sorted(base.glob(pattern)) if any(sign in pattern for sign in "*?[") else []
-        found += matches or [base / pattern]
+        found += matching_files(base, pattern)
     return found
+
+
+def matching_files(base: Path, pattern: str) -> list[Path]:
+    """The files that a pattern of a manifest stands for, sorted; itself where there is none."""
+    matches = sorted(base.glob(pattern)) if any(sign in pattern for sign in "*?[") else []
+    return matches or [base / pattern]
 
 
 def _line(text: str, key: str) -> int:
