@@ -49,15 +49,21 @@ class Loaded:
     config_ok: bool
 
 
-def load_datasets(config_path: str | Path = CONFIG, raw_dir: str | Path = RAW, boards: Path = BOARDS) -> Loaded:
-    """Read and check config.yaml, every data set it asks for, and their boards. Raises nothing for a user's mistake."""
+def load_datasets(
+    config_path: str | Path = CONFIG, raw_dir: str | Path = RAW, boards: str | Path = BOARDS, files: bool = False
+) -> Loaded:
+    """Read and check config.yaml, every data set it asks for, and their boards. Raises nothing for a user's mistake.
+
+    files : the files of each recording must exist. The workflow leaves that to the decoding, which refuses the one
+            recording and lets the others go on.
+    """
     config, problems = _config(Path(config_path))
     config_ok = not problems
     names, missing = _names(config, Path(config_path), Path(raw_dir))
     problems += missing
     datasets = {}
     for name in names:
-        dataset, found = load_dataset(Path(raw_dir) / name / MANIFEST, config, boards)
+        dataset, found = load_dataset(Path(raw_dir) / name / MANIFEST, config, Path(boards), files)
         problems += found
         if dataset is not None and not found:
             datasets[name] = dataset
@@ -65,7 +71,7 @@ def load_datasets(config_path: str | Path = CONFIG, raw_dir: str | Path = RAW, b
 
 
 def load_dataset(
-    path: Path, config: Config, boards: Path = BOARDS, files: bool = True
+    path: Path, config: Config, boards: Path = BOARDS, files: bool = False
 ) -> tuple[Dataset | None, list[Problem]]:
     """Read and check one manifest; `files`: its files must exist. None where it could not be read at all."""
     source = str(path)
