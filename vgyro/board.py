@@ -18,10 +18,10 @@ ByteOrder = Literal["big", "little"]
 class ChannelField(StrictModel):
     """One field of a frame; `count` > 1 makes channels name1..nameN, side by side."""
 
-    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
-    type: FieldType
+    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", description="the channel's name")
+    type: FieldType = Field(description="u, i, f: unsigned, signed, floating point; bits")
     at: int | None = Field(None, ge=0, description="byte offset from the first sync byte (binary); text: column order")
-    count: int = Field(1, ge=1)
+    count: int = Field(1, ge=1, description="channels of this type")
     stride: int | None = Field(None, ge=1, description="bytes between two of `count`; null: packed")
     byte_order: ByteOrder | None = Field(None, description="null: that of the frame")
 
@@ -37,17 +37,17 @@ class Checksum(StrictModel):
     pad_to : zero bytes are added to a multiple of this before the CRC is taken
     """
 
-    family: Literal["crc", "sum", "xor", "none"]
-    width: Literal[8, 16, 32] = 16
-    polynomial: int = 0x1021
-    init: int = 0
-    reflected: bool = False
-    xor_out: int = 0
-    span: tuple[int, int] | None = None
-    at: int | None = None
-    equals: int | None = None
-    pad_to: int = Field(1, ge=1)
-    byte_order: ByteOrder | None = None
+    family: Literal["crc", "sum", "xor", "none"] = Field(description="how it is computed")
+    width: Literal[8, 16, 32] = Field(16, description="bits")
+    polynomial: int = Field(0x1021, description="crc: generator, without the leading one")
+    init: int = Field(0, description="crc: register before the first byte")
+    reflected: bool = Field(False, description="crc: least significant bit first, in and out")
+    xor_out: int = Field(0, description="crc: added to the result by exclusive or")
+    span: tuple[int, int] | None = Field(None, description="bytes covered: [first, one past the last]")
+    at: int | None = Field(None, description="byte offset of the stored value")
+    equals: int | None = Field(None, description="what the total must be, where no value is stored")
+    pad_to: int = Field(1, ge=1, description="zero bytes are added to a multiple of this first")
+    byte_order: ByteOrder | None = Field(None, description="null: that of the frame")
 
     @model_validator(mode="after")
     def _has_a_place(self) -> Checksum:
@@ -59,13 +59,13 @@ class Checksum(StrictModel):
 class BinaryFrame(StrictModel):
     """Frames of fixed length that begin with sync bytes."""
 
-    kind: Literal["binary"]
+    kind: Literal["binary"] = Field(description="binary")
     sync: str = Field(description="hexadecimal bytes, such as EB 90")
     length: int = Field(ge=2, description="bytes of a whole frame, checksum included")
-    byte_order: ByteOrder = "big"
+    byte_order: ByteOrder = Field("big", description="of all fields, unless a field says otherwise")
     constants: dict[int, str] = Field(default={}, description="offset: hexadecimal bytes that never change")
-    fields: tuple[ChannelField, ...]
-    checksum: Checksum
+    fields: tuple[ChannelField, ...] = Field(description="what the frame carries")
+    checksum: Checksum = Field(description="how a whole frame is told from a damaged one")
 
     @field_validator("sync")
     @classmethod
@@ -89,11 +89,11 @@ class BinaryFrame(StrictModel):
 class TextFrame(StrictModel):
     """Lines of text: prefix, fields between separators, checksum; fields are read in the order of the list."""
 
-    kind: Literal["text"]
-    prefix: str = ""
+    kind: Literal["text"] = Field(description="text")
+    prefix: str = Field("", description="how each line begins")
     separator: str = Field(",", description="a space means any run of white space")
-    fields: tuple[ChannelField, ...]
-    checksum: Checksum = Checksum(family="none")
+    fields: tuple[ChannelField, ...] = Field(description="what the line carries, in order")
+    checksum: Checksum = Field(Checksum(family="none"), description="how a whole line is told from a damaged one")
     require: dict[str, int] = Field(default={}, description="field: value that marks a valid line")
     max_length: int = Field(256, ge=8, description="a longer line is damage")
 
@@ -101,15 +101,15 @@ class TextFrame(StrictModel):
 class Counter(StrictModel):
     """The frame counter, and where it wraps."""
 
-    field: str
-    modulus: int = Field(ge=2)
+    field: str = Field(description="channel that holds it")
+    modulus: int = Field(ge=2, description="it counts from 0 to modulus - 1")
     step: int = Field(1, ge=1, description="increment from one frame to the next")
 
 
 class TimeStamp(StrictModel):
     """The device's clock, and where it wraps."""
 
-    field: str
+    field: str = Field(description="channel that holds it")
     tick_s: float = Field(gt=0, description="length of a tick, s")
     wrap: int | None = Field(None, ge=2, description="ticks; null: never")
 
@@ -117,18 +117,18 @@ class TimeStamp(StrictModel):
 class Adc(StrictModel):
     """Counts at the two rails; a sample there is clipped. coding as in the frame, before `offset_binary` is removed."""
 
-    low: int
-    high: int
-    coding: Literal["twos_complement", "straight_binary"] = "twos_complement"
+    low: int = Field(description="count at the lower rail")
+    high: int = Field(description="count at the upper rail")
+    coding: Literal["twos_complement", "straight_binary"] = Field("twos_complement", description="of the counts")
 
 
 class Gyro(StrictModel):
     """One gyro: rate [deg/s] = sign · (count - bias) · scale, along `axis` of the board."""
 
-    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
+    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", description="the gyro's name")
     field: str = Field(description="channel that holds it")
-    axis: str = Field(pattern=r"^[A-Za-z0-9_]+$")
-    sign: Literal[1, -1] = 1
+    axis: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="axis of the board; gyros that share it are an array")
+    sign: Literal[1, -1] = Field(1, description="-1: mounted the other way round")
     scale: float = Field(gt=0, description="nominal scale, deg/s a count")
     bias: float = Field(0.0, description="nominal zero-rate output, counts")
     range_deg_s: float | None = Field(None, gt=0, description="measuring range, deg/s")
@@ -137,27 +137,27 @@ class Gyro(StrictModel):
 class Temperature(StrictModel):
     """One temperature channel: °C = count · scale + offset."""
 
-    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
-    field: str
+    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", description="the sensor's name")
+    field: str = Field(description="channel that holds it")
     gyro: str | None = Field(None, description="the gyro it sits in; null: the board")
-    scale: float
-    offset: float
+    scale: float = Field(description="°C a count")
+    offset: float = Field(description="°C at count 0")
 
 
 class Board(StrictModel):
     """A board file. Channels that no gyro or temperature names are decoded and kept all the same."""
 
-    name: str
-    title: str
+    name: str = Field(description="the file's name without .yaml")
+    title: str = Field(description="heading in reports")
     source: str = Field("", description="document that gives the layout and the scaling")
     rate_hz: float = Field(gt=0, description="frames a second, unless a recording says otherwise")
-    baud: int | None = Field(None, gt=0)
-    frame: Annotated[BinaryFrame | TextFrame, Field(discriminator="kind")]
-    counter: Counter | None = None
-    timestamp: TimeStamp | None = None
-    adc: Adc | None = None
-    gyros: tuple[Gyro, ...] = Field(min_length=1)
-    temperatures: tuple[Temperature, ...] = ()
+    baud: int | None = Field(None, gt=0, description="of the serial line, for information")
+    frame: Annotated[BinaryFrame | TextFrame, Field(discriminator="kind")] = Field(description="layout of a frame")
+    counter: Counter | None = Field(None, description="null: the board sends none")
+    timestamp: TimeStamp | None = Field(None, description="null: the board sends none")
+    adc: Adc | None = Field(None, description="null: clipping is not looked for")
+    gyros: tuple[Gyro, ...] = Field(min_length=1, description="the gyros to analyse")
+    temperatures: tuple[Temperature, ...] = Field((), description="the temperature channels")
 
     @property
     def channels(self) -> list[str]:
@@ -189,7 +189,9 @@ class Board(StrictModel):
                 raise ValueError(f"two gyros are named {name!r}")
         for temperature in self.temperatures:
             if temperature.gyro is not None and temperature.gyro not in names:
-                raise ValueError(f"temperature {temperature.name!r} names the gyro {temperature.gyro!r}, which is not there")
+                raise ValueError(
+                    f"temperature {temperature.name!r} names the gyro {temperature.gyro!r}, which is not there"
+                )
         return self
 
 

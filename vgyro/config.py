@@ -44,11 +44,17 @@ class VolatilityOptions(StrictModel):
     rate_hz: float | Literal["full"] = Field(1.0, description="rate of the analysed series (block means), or full")
     window: int = Field(360, ge=50, description="samples in a window")
     step: int = Field(30, ge=1, description="samples between the starts of two windows")
-    definitions: tuple[Definition, ...] = Field(DEFINITIONS, min_length=1, description="what r_t is")
-    modes: tuple[Mode, ...] = Field(MODES, min_length=1, description="in_sample (the paper) and causal")
-    models: tuple[CorrelationModel, ...] = Field(("dcc", "ccc"), min_length=1, description="correlation models")
+    definitions: tuple[Definition, ...] = Field(
+        DEFINITIONS, min_length=1, description="what r_t is: the rate, less its mean, its difference, its residual"
+    )
+    modes: tuple[Mode, ...] = Field(
+        MODES, min_length=1, description="in_sample: variance of the window's own samples; causal: of later ones only"
+    )
+    models: tuple[CorrelationModel, ...] = Field(
+        ("dcc", "ccc"), min_length=1, description="dcc: correlation changes with time; ccc: it does not"
+    )
     arch_lags: int = Field(1, ge=1, description="lags of the ARCH-LM test")
-    residual_span: int = Field(15, ge=3, description="samples of the first-pass rate estimate that `residual` removes")
+    residual_span: int = Field(15, ge=3, description="samples averaged for the rate that `residual` removes")
     detrend_span: int = Field(61, ge=5, description="samples of the running mean that `detrended` removes")
 
     @model_validator(mode="after")
@@ -62,7 +68,7 @@ class VolatilityOptions(StrictModel):
 class FusionOptions(StrictModel):
     """Methods to run, and the parameters of the Kalman filters. A null parameter is estimated from the data."""
 
-    methods: tuple[str, ...] | Literal["all"] = Field("all", description="names of vgyro.fusion.METHODS, or all")
+    methods: tuple[str, ...] | Literal["all"] = Field("all", description="names of methods (docs/methods.md), or all")
     bandwidth_hz: float = Field(1.0, gt=0, description="bandwidth that sets q of the Kalman filters, Hz")
     bandwidth_dynamic_hz: float = Field(5.0, gt=0, description="the same for recordings in motion, Hz")
     q: float | None = Field(None, gt=0, description="process noise at rest, deg²/s³; null: from bandwidth_hz")
@@ -93,7 +99,9 @@ class CrossCheckOptions(StrictModel):
 class Analysis(StrictModel):
     """Everything that a manifest may override for its data set."""
 
-    engine: Engine = Field("reference", description="who computes: reference (the libraries)")
+    engine: Engine = Field(
+        "reference", description="who computes; reference: the libraries arch, pymgarch, cvxpy, filterpy, allantools"
+    )
     integrity: IntegrityOptions = IntegrityOptions()
     rest: RestOptions = RestOptions()
     volatility: VolatilityOptions = VolatilityOptions()

@@ -17,9 +17,9 @@ AT_REST: tuple[Kind, ...] = ("static", "thermal")
 class Plateau(StrictModel):
     """The table turned at `rate` deg/s from `start` to `stop`, s after the first frame; settling already left out."""
 
-    start: float = Field(ge=0)
-    stop: float
-    rate: float
+    start: float = Field(ge=0, description="begin, s")
+    stop: float = Field(description="end, s")
+    rate: float = Field(description="true rate, deg/s; positive about the axis")
 
     @model_validator(mode="after")
     def _forward(self) -> Plateau:
@@ -29,31 +29,35 @@ class Plateau(StrictModel):
 
 
 class PlateauReference(StrictModel):
-    kind: Literal["plateaus"]
-    plateaus: tuple[Plateau, ...] = Field(min_length=2)
+    """Stretches of constant, known rate, as a rate table makes them."""
+
+    kind: Literal["plateaus"] = Field(description="plateaus")
+    plateaus: tuple[Plateau, ...] = Field(min_length=2, description="at least two, of different rates")
 
 
 class ConstantReference(StrictModel):
-    kind: Literal["constant"]
+    """One rate throughout."""
+
+    kind: Literal["constant"] = Field(description="constant")
     rate: float = Field(description="deg/s")
 
 
 class SinusoidReference(StrictModel):
     """rate = amplitude · sin(2π·frequency·t + phase); a null phase is fitted to the mean of the array."""
 
-    kind: Literal["sinusoid"]
+    kind: Literal["sinusoid"] = Field(description="sinusoid")
     amplitude: float = Field(gt=0, description="deg/s")
-    frequency_hz: float = Field(gt=0)
-    phase_rad: float | None = None
+    frequency_hz: float = Field(gt=0, description="Hz")
+    phase_rad: float | None = Field(None, description="at the first frame, rad; null: fitted")
 
 
 class FileReference(StrictModel):
     """A logged rate: Parquet or CSV with a time column (s, the recording's clock) and a rate column (deg/s)."""
 
-    kind: Literal["file"]
-    file: str
-    time: str = "time"
-    rate: str = "rate"
+    kind: Literal["file"] = Field(description="file")
+    file: str = Field(description="Parquet or CSV, in `folder`")
+    time: str = Field("time", description="column with the time, s after the first frame")
+    rate: str = Field("rate", description="column with the true rate, deg/s")
 
 
 Reference = Annotated[
@@ -65,22 +69,22 @@ class ParquetLog(StrictModel):
     """An archived log instead of dumps. `columns` maps the board's channels (or gyros) to the log's columns."""
 
     columns: dict[str, str] = Field(default={}, description="channel or gyro of the board: column of the log")
-    values: Literal["counts", "rates"] = "counts"
+    values: Literal["counts", "rates"] = Field("counts", description="rates: deg/s already, not calibrated again")
     time: str | None = Field(None, description="column with the time in s; null: row number / rate_hz")
 
 
 class Recording(StrictModel):
     """One run of the board."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
-    kind: Kind
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", description="letters, digits, - and _")
+    kind: Kind = Field(description="what the board did")
     files: tuple[str, ...] = Field(min_length=1, description="dumps in order, or a Parquet file or folder; globs too")
     parquet: ParquetLog | None = Field(None, description="set: the files are Parquet logs")
     rate_hz: float | None = Field(None, gt=0, description="null: the board's")
     rest: tuple[tuple[float, float], ...] | Literal["auto"] = Field(
         "auto", description="known standstill, [start, stop] in s; auto: all of a static recording, found in a free one"
     )
-    reference: Reference | None = None
+    reference: Reference | None = Field(None, description="the true rate, where it is known")
     axis: str | None = Field(None, description="the axis that the reference turns about; null: the board's only one")
 
     @field_validator("files", mode="before")
@@ -101,14 +105,14 @@ class Manifest(StrictModel):
     """raw/<dataset>/dataset.yaml"""
 
     board: str = Field(description="name of a file in config/boards, or a path to one, from the manifest's folder")
-    title: str = ""
+    title: str = Field("", description="heading of the report")
     simulated: bool = Field(False, description="true: every page says so")
     twin: str | None = Field(None, description="the twin that made the data, where it is simulated")
     folder: str = Field(".", description="where the files are, from the manifest's folder")
     gyros: tuple[str, ...] | Literal["all"] = Field("all", description="gyros to use")
     latitude_deg: float | None = Field(None, ge=-90, le=90, description="for the Earth rate on a vertical axis")
-    notes: str = ""
-    recordings: tuple[Recording, ...] = Field(min_length=1)
+    notes: str = Field("", description="free text, shown in the report")
+    recordings: tuple[Recording, ...] = Field(min_length=1, description="the runs of the board")
     analysis: Analysis | None = Field(None, description="keys of config.yaml's `analysis` to override")
 
     @model_validator(mode="after")

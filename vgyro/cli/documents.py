@@ -1,0 +1,23 @@
+"""Write config/config.yaml and docs/configuration.md from the models.
+
+`python -m vgyro.cli.documents`, in the top folder. It overwrites both; a config.yaml of your own should be kept elsewhere first.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vgyro.describe import config_yaml, configuration_guide
+from vgyro.storage.tables import write_text
+
+DOCUMENTS = {"config/config.yaml": config_yaml, "docs/configuration.md": configuration_guide}
+
+
+def write_documents(top: Path) -> None:
+    """Write every document below `top`."""
+    for name, text in DOCUMENTS.items():
+        write_text(top / name, text())
+
+
+if __name__ == "__main__":
+    write_documents(Path())
