@@ -1,7 +1,7 @@
 """The reference engine: the libraries that users already trust.
 
 garch   : GARCH by arch
-dcc     : DCC, its two-step standard errors and its test by pymgarch
+dcc     : DCC by SciPy's SLSQP, with the two-step standard errors of pymgarch
 weights : constrained minimum-variance weights by cvxpy
 allan   : Allan deviation by allantools
 kalman  : filters by filterpy
@@ -13,6 +13,11 @@ from __future__ import annotations
 
 from importlib import import_module
 from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
+    from vgyro.engine.reference import allan, dcc, garch, kalman, weights  # noqa: F401
 
 MODULES = ("garch", "dcc", "weights", "allan", "kalman")
 

@@ -1,0 +1,181 @@
+"""GARCH by `arch` (Sheppard): Gaussian quasi maximum likelihood, mean zero, our start of the recursion."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vgyro.engine.models import BOUNDARY, CONVERGED, FAILED, NO_VARIANCE, PERSISTENCE_MAX, TOO_SHORT, GarchFit
+from vgyro.engine.recursions import garch_log_likelihood, garch_variance
+
+MIN_SAMPLES = 20
+ALPHA_ZERO = 1e-6
+"""α below this is 0: the optimiser's zero."""
+ALPHA_NEAR_ZERO = 1e-3
+"""α below this has no usable standard error: β is all but unidentified."""
+FLAT = 1e-12
+"""A series that varies by less than this share of its size has no variance."""
+# Grid of starts: the best point of each half is handed to the optimiser, so that no start depends on another window.
+GRID_ALPHA = (0.02, 0.06, 0.15, 0.3)
+GRID_SLOW = (0.9, 0.95, 0.98, 0.995)
+GRID_FAST = (0.2, 0.4, 0.6, 0.8)
+OPTIONS = {"ftol": 1e-8, "maxiter": 300}
+
+
+@dataclass(frozen=True)
+class _Series:
+    """One fitted column, in units of its own mean square."""
+
+    parameters: np.ndarray
+    stderr: np.ndarray
+    status: str
+
+
+def fit_garch(r: np.ndarray) -> GarchFit:
+    """Fit GARCH(1,1) to each column of r [T, N], deg/s. See vgyro.volatility.fit_garch for the conventions."""
+    r = np.asarray(r, dtype=float)
+    fits, scales = [], []
+    for column in r.T:
+        scale = float(np.mean(np.square(column)))
+        fits.append(_fit_column(column, scale))
+        scales.append(scale)
+    omega, alpha, beta = np.array([fit.parameters for fit in fits]).reshape(-1, 3).T
+    stderr = np.array([fit.stderr for fit in fits]).reshape(-1, 3)
+    scale = np.array(scales)
+    stderr[:, 0] *= scale
+    variance = garch_variance(r, omega * scale, alpha, beta)
+    return GarchFit(
+        omega=omega * scale,
+        alpha=alpha,
+        beta=beta,
+        stderr=stderr,
+        log_likelihood=garch_log_likelihood(r, variance),
+        variance=variance,
+        status=np.array([fit.status for fit in fits], dtype=object),
+    )
+
+
+def _fit_column(column: np.ndarray, scale: float) -> _Series:
+    nothing = np.full(3, np.nan)
+    if not np.all(np.isfinite(column)):
+        return _Series(nothing, nothing, FAILED)
+    if len(column) < MIN_SAMPLES:
+        return _Series(nothing, nothing, TOO_SHORT)
+    if np.ptp(column) <= FLAT * np.max(np.abs(column)):
+        return _Series(nothing, nothing, NO_VARIANCE)
+    e = column / np.sqrt(scale)
+    model = _model(e, 1, 1)
+    # With α = 0 nothing is left but a constant variance: β = 0, ω = mean(e²).
+    constant = np.array([1.0, 0.0, 0.0])
+    best, best_value, fit = constant, _value(e, constant), None
+    failures = 0
+    for start in _starts(e):
+        result = _fit_from(model, start)
+        parameters = _inside(np.asarray(result.params, dtype=float))
+        failures += not _ended_well(result)
+        value = _value(e, parameters)
+        if parameters[1] > ALPHA_ZERO and value > best_value:
+            best, best_value, fit = parameters, value, result
+    if fit is None:
+        return _Series(constant, nothing, FAILED if failures == 2 else BOUNDARY)
+    if not _ended_well(fit):
+        return _Series(best, nothing, FAILED)
+    if best[1] < ALPHA_NEAR_ZERO or best[2] < ALPHA_ZERO or best[1] + best[2] >= PERSISTENCE_MAX:
+        return _Series(best, nothing, BOUNDARY)
+    stderr = _stderr(fit)
+    return _Series(best, stderr, CONVERGED if np.all(np.isfinite(stderr)) else BOUNDARY)
+
+
+def _model(e: np.ndarray, arch_lags: int, garch_lags: int) -> Any:
+    from arch import arch_model
+
+    return arch_model(e, mean="Zero", vol="GARCH", p=arch_lags, q=garch_lags, rescale=False)
+
+
+def _fit_from(model: Any, start: np.ndarray) -> Any:
+    # e has a mean square of 1, which is therefore the backcast; arch's own default makes spurious optima.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return model.fit(disp="off", show_warning=False, starting_values=start, backcast=1.0, options=dict(OPTIONS))
+
+
+def _ended_well(result: Any) -> bool:
+    # 8: no step improves the likelihood any more, which at this tolerance is the optimum to rounding.
+    return result.convergence_flag in (0, 8)
+
+
+def _inside(parameters: np.ndarray) -> np.ndarray:
+    """Clip what the optimiser returned to α, β >= 0, α + β < 1."""
+    omega = max(parameters[0], 1e-8)
+    alpha = min(max(parameters[1], 0.0), PERSISTENCE_MAX)
+    return np.array([omega, alpha, min(max(parameters[2], 0.0), PERSISTENCE_MAX - alpha)])
+
+
+def _value(e: np.ndarray, parameters: np.ndarray) -> float:
+    omega, alpha, beta = parameters
+    variance = garch_variance(e[:, None], np.array([omega]), np.array([alpha]), np.array([beta]))
+    return float(garch_log_likelihood(e[:, None], variance)[0])
+
+
+def _starts(e: np.ndarray) -> list[np.ndarray]:
+    starts = []
+    for half in (GRID_SLOW, GRID_FAST):
+        points = [(alpha, total - alpha) for alpha, total in itertools.product(GRID_ALPHA, half) if total > alpha]
+        alpha, beta = np.array(points).T
+        omega = 1 - alpha - beta
+        series = np.repeat(e[:, None], len(points), axis=1)
+        best = int(np.argmax(garch_log_likelihood(series, garch_variance(series, omega, alpha, beta))))
+        starts.append(np.array([omega[best], alpha[best], beta[best]]))
+    return starts
+
+
+def _stderr(result: Any) -> np.ndarray:
+    """Bollerslev & Wooldridge's robust standard errors, as arch computes them."""
+    try:
+        with np.errstate(invalid="ignore"):
+            return np.asarray(result.std_err, dtype=float)
+    except np.linalg.LinAlgError:
+        return np.full(3, np.nan)
+
+
+@dataclass(frozen=True)
+class GarchPq:
+    """GARCH(p,q) of N series; alpha [N, q] of past squares, beta [N, p] of past variances (Liu et al. 2015, eq. 1)."""
+
+    omega: np.ndarray
+    alpha: np.ndarray
+    beta: np.ndarray
+    log_likelihood: np.ndarray
+    variance: np.ndarray
+    status: np.ndarray
+
+
+def fit_garch_pq(r: np.ndarray, p: int = 1, q: int = 1) -> GarchPq:
+    """Fit GARCH(p,q), p past variances and q past squares, to each column of r [T, N], deg/s.
+
+    Squares and variances before the first sample are mean(e²). One start (arch's own grid): for small orders, and to
+    compare with (1,1), which is what the pipeline uses.
+    Liu et al. (2015), eq. 1. Their p counts variances and q squares; arch names them the other way round.
+    """
+    r = np.asarray(r, dtype=float)
+    samples, n = r.shape
+    omega, alpha, beta = np.full(n, np.nan), np.full((n, q), np.nan), np.full((n, p), np.nan)
+    variance, status = np.full((samples, n), np.nan), np.full(n, FAILED, dtype=object)
+    for i, column in enumerate(r.T):
+        if np.ptp(column) <= FLAT * np.max(np.abs(column)):
+            status[i] = NO_VARIANCE
+            continue
+        scale = float(np.mean(np.square(column)))
+        model = _model(column / np.sqrt(scale), q, p)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            result = model.fit(disp="off", show_warning=False, backcast=1.0, options=dict(OPTIONS))
+        found = np.asarray(result.params, dtype=float)
+        omega[i], alpha[i], beta[i] = found[0] * scale, found[1 : 1 + q], found[1 + q :]
+        variance[:, i] = np.square(result.conditional_volatility) * scale
+        status[i] = CONVERGED if _ended_well(result) else FAILED
+    return GarchPq(omega, alpha, beta, garch_log_likelihood(r, variance), variance, status)
