@@ -1,0 +1,23 @@
+"""Fusion of an array into one rate: weights, filters, and the registry of methods."""
+
+from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, Method
+from vgyro.fusion.registry import METHODS, Outcome, run_methods, select
+from vgyro.fusion.weights import SampleWeights, block_of_sample, expand_weights, min_variance_weights, usable
+
+__all__ = [
+    "METHODS",
+    "ArrayNoise",
+    "ArrayRates",
+    "CannotRun",
+    "FilterParameters",
+    "Fused",
+    "Method",
+    "Outcome",
+    "SampleWeights",
+    "block_of_sample",
+    "expand_weights",
+    "min_variance_weights",
+    "run_methods",
+    "select",
+    "usable",
+]

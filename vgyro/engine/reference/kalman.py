@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from filterpy.kalman import KalmanFilter
 
 
 def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, start: float) -> np.ndarray:
@@ -44,7 +49,7 @@ def kalman_filter(
     return estimate, spread
 
 
-def _filter(gyros: int, transition: float, start: float):  # noqa: ANN202 - a class of filterpy
+def _filter(gyros: int, transition: float, start: float) -> KalmanFilter:
     from filterpy.kalman import KalmanFilter
 
     filter_ = KalmanFilter(dim_x=1, dim_z=gyros)

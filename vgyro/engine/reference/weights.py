@@ -20,8 +20,8 @@ def min_variance_weights(H: np.ndarray) -> np.ndarray:
     H       : array [M, N, N], symmetric, positive definite (vgyro.fusion.min_variance_weights checks that)
     returns : w [M, N]
     Where H⁻¹1 has no negative element it is the answer already, by its KKT conditions; the rest goes to cvxpy
-    (Clarabel). Then the equality system is solved on the support, so that the weights are exact to rounding, and the KKT
-    conditions are checked; a support that fails them is mended by single exchanges.
+    (Clarabel). Then the equality system is solved on the support, so that the weights are exact to rounding, and the
+    KKT conditions are checked; a support that fails them is mended by single exchanges.
     Liu et al. (2015), eq. 15-16; they name an active-set method.
     """
     # The optimum is at most the smallest variance: with that as the unit every figure that matters is of order one,
@@ -77,7 +77,7 @@ def _polish(H: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 
 def _violation(H: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """By how much the variance would fall if a gyro's weight rose from zero, relative to the variance: > 0 breaks KKT."""
+    """Relative fall of the variance as a gyro's weight rises from zero [M, N]: > 0 breaks the KKT conditions."""
     gradient = np.einsum("kij,kj->ki", H, weights)
     variance = np.einsum("ki,ki->k", gradient, weights)
     return 1.0 - gradient / variance[:, None]

@@ -1,0 +1,161 @@
+"""What the fusion methods take and give: the rates of one array, its noise, the parameters, the fused rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from vgyro.config import FusionOptions
+from vgyro.errors import DataError
+from vgyro.units import arw_deg_s_rt_hz
+
+WeightKey = tuple[str, str, str]
+"""model (dcc, ccc), mode (in_sample, causal), definition of r_t"""
+
+
+class CannotRun(DataError):
+    """A method cannot run on this array; the others go on, and the reason goes into the methods table."""
+
+
+@dataclass(frozen=True)
+class ArrayNoise:
+    """Noise of the gyros of one array.
+
+    arw         : array [N], deg/s/√Hz two-sided; NaN where it was not measured
+    rrw         : array [N], deg/s/√s; NaN where it was not measured, 0 where none was found
+    correlation : array [N, N] of the noise, unit diagonal
+    """
+
+    arw: np.ndarray
+    rrw: np.ndarray
+    correlation: np.ndarray
+
+    @property
+    def R(self) -> np.ndarray:
+        """Continuous noise covariance [N, N], (deg/s)²/Hz: arw_i · arw_j · correlation_ij."""
+        return np.outer(self.arw, self.arw) * self.correlation
+
+    def with_arw(self, arw: float | None) -> ArrayNoise:
+        """The same array with one ARW for every gyro, deg/s/√Hz; None changes nothing."""
+        return self if arw is None else replace(self, arw=np.full(len(self.arw), arw))
+
+
+@dataclass(frozen=True)
+class ArrayRates:
+    """One recording of one array.
+
+    rate    : array [T, N], deg/s;  rate_hz : sample rate, Hz
+    segment : array [T], number of the gap-free stretch;  at_rest : array [T] of bool
+    weights : (model, mode, definition) → weights [T, N], one row a sample; see vgyro.fusion.weights.SampleWeights
+    """
+
+    rate: np.ndarray
+    rate_hz: float
+    segment: np.ndarray
+    at_rest: np.ndarray
+    noise: ArrayNoise
+    weights: Mapping[WeightKey, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        samples = len(self.rate)
+        if self.rate.ndim != 2 or samples == 0 or len(self.segment) != samples or len(self.at_rest) != samples:
+            raise DataError(
+                f"rate {self.rate.shape}, segment {self.segment.shape} and at_rest {self.at_rest.shape} do not fit",
+                remedy="give [T, N], [T] and [T] with T >= 1",
+            )
+
+    @property
+    def period(self) -> float:
+        """Sample period T, s."""
+        return 1.0 / self.rate_hz
+
+    def stretches(self) -> list[slice]:
+        """The gap-free stretches, in order."""
+        borders = np.flatnonzero(np.diff(self.segment)) + 1
+        edges = [0, *borders.tolist(), len(self.segment)]
+        return [slice(start, stop) for start, stop in pairwise(edges)]
+
+
+@dataclass(frozen=True)
+class FilterParameters:
+    """Parameters of the methods.
+
+    bandwidth_hz    : -3 dB bandwidth that sets q where q is None
+    q               : process noise of the rate, deg²/s³; None: from bandwidth_hz
+    arw             : one ARW for all gyros in R of the filters, deg/s/√Hz; None: as measured
+    tau_s           : time constant of the first-order Markov rate, s
+    block_hz        : rate of the block means whose second moments make weights, Hz
+    moment_window_s, ewma_time_s : memory of these moments, s
+    in_motion       : the board moves in this recording, at least in part
+    definition      : definition of r_t, for the methods that have one each
+    """
+
+    bandwidth_hz: float = 1.0
+    q: float | None = None
+    arw: float | None = None
+    tau_s: float = 500.0
+    block_hz: float = 1.0
+    moment_window_s: float = 360.0
+    ewma_time_s: float = 60.0
+    in_motion: bool = False
+    definition: str = ""
+
+    @classmethod
+    def of(cls, options: FusionOptions, in_motion: bool, block_hz: float = 1.0) -> FilterParameters:
+        """The user's options, for a recording at rest or in motion."""
+        arw = options.arw_deg_rt_h
+        return cls(
+            bandwidth_hz=options.bandwidth_dynamic_hz if in_motion else options.bandwidth_hz,
+            q=options.q_dynamic if in_motion else options.q,
+            arw=None if arw is None else arw_deg_s_rt_hz(arw),
+            tau_s=options.tau_s,
+            block_hz=block_hz,
+            moment_window_s=options.moment_window_s,
+            ewma_time_s=options.ewma_time_s,
+            in_motion=in_motion,
+        )
+
+
+@dataclass(frozen=True)
+class Fused:
+    """A virtual gyroscope.
+
+    rate               : array [T], deg/s
+    weights            : array [N] or [T, N]; None where the method has none
+    dc_gain            : gain for a constant rate
+    bandwidth_hz       : -3 dB bandwidth, Hz; NaN: not limited by the method
+    noise_bandwidth_hz : noise-equivalent bandwidth, one-sided, Hz; NaN: not limited
+    delay_s            : delay at low frequency, s
+    note               : what to know before using it
+    """
+
+    rate: np.ndarray
+    weights: np.ndarray | None = None
+    dc_gain: float = 1.0
+    bandwidth_hz: float = math.nan
+    noise_bandwidth_hz: float = math.nan
+    delay_s: float = 0.0
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to make one rate of many: an entry of vgyro.fusion.METHODS.
+
+    causal : sample t uses nothing later than t; noise coefficients count as known beforehand
+    needs  : what it takes beside the rates: "arw", "rrw" (of every gyro), "weights" (of vgyro.volatility)
+    fuse   : (ArrayRates, FilterParameters) → Fused;  raises CannotRun, with the reason
+    per_definition : it runs once for each definition of r_t
+    """
+
+    name: str
+    title: str
+    source: str
+    causal: bool
+    needs: tuple[str, ...]
+    fuse: Callable[[ArrayRates, FilterParameters], Fused]
+    per_definition: bool = False

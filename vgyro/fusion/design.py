@@ -1,0 +1,99 @@
+"""Design of the scalar rate filters: information, bandwidth, process noise, steady-state covariance.
+
+Units: q in deg²/s³ (that is (deg/s)²/s), R in (deg/s)²/Hz, D in Hz/(deg/s)² , s in rad/s, P in (deg/s)².
+All of this is continuous time. The gain of the continuous filter, brought to samples by a zero-order hold, is not the
+optimal gain of the discrete filter: for a random walk it is larger by the share (s·T)²/24 when s·T is small.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vgyro.errors import DataError
+
+
+def information(R: np.ndarray) -> float:
+    """D = 1'R⁻¹1, Hz/(deg/s)²: what one second of the whole array says about the rate. Jiang et al. (2012), eq. 10.
+
+    R      : continuous noise covariance [N, N], (deg/s)²/Hz
+    raises : DataError if R is not finite and positive definite
+    """
+    return float(_solved(R).sum())
+
+
+def gain_direction(R: np.ndarray) -> np.ndarray:
+    """u = R⁻¹1/(1'R⁻¹1) [N]: how the gain is shared between the gyros, Σu = 1; not bounded to 0..1."""
+    solved = _solved(R)
+    return solved / solved.sum()
+
+
+def _solved(R: np.ndarray) -> np.ndarray:
+    R = np.asarray(R, dtype=float)
+    try:
+        if not np.isfinite(R).all():
+            raise np.linalg.LinAlgError
+        np.linalg.cholesky(R)
+    except np.linalg.LinAlgError:
+        raise DataError(
+            "the noise covariance R is not finite and positive definite",
+            remedy="look for gyros that are copies of each other or whose angle random walk was not measured",
+        ) from None
+    return np.linalg.solve(R, np.ones(len(R)))
+
+
+def pole(D: float, q: float, tau: float = math.inf) -> float:
+    """s = √(1/τ² + D·q), rad/s: pole of the steady-state filter; τ = ∞ is the random walk. Eq. 15."""
+    return math.sqrt(1.0 / tau**2 + D * q)
+
+
+def bandwidth(D: float, q: float, tau: float = math.inf) -> float:
+    """-3 dB bandwidth s/2π, Hz. Jiang et al. (2012), eq. 18 and, for τ = ∞, eq. 19."""
+    return pole(D, q, tau) / (2.0 * math.pi)
+
+
+def q_for_bandwidth(D: float, bandwidth_hz: float, tau: float = math.inf) -> float:
+    """Process noise that gives a bandwidth: q = ((2π·BW)² - 1/τ²)/D, deg²/s³.
+
+    For τ = ∞ it is √q = 2π·BW/√D (Chang et al. 2012).
+    raises : DataError if the Markov rate alone is already faster than the bandwidth
+    """
+    q = ((2.0 * math.pi * bandwidth_hz) ** 2 - 1.0 / tau**2) / D
+    if q <= 0:
+        raise DataError(
+            f"a bandwidth of {bandwidth_hz:g} Hz is below 1/(2πτ) with τ = {tau:g} s",
+            "fusion.bandwidth_hz",
+            "give a larger bandwidth or a larger tau_s",
+        )
+    return q
+
+
+def steady_variance(D: float, q: float, tau: float = math.inf) -> float:
+    """P∞ = (s - 1/τ)/D, (deg/s)². Jiang et al. (2012), eq. 11; τ = ∞ gives eq. 20, √(q/D)."""
+    s = pole(D, q, tau)
+    # (s - 1/τ) written without its cancellation, which matters where D·q is far below 1/τ².
+    return q / (s + 1.0 / tau)
+
+
+def steady_variance_identical(q: float, arw: float, gyros: int, correlation: float) -> float:
+    """P∞ of a random-walk filter over N alike gyros: √(q·σ²·(1 + (N-1)ρ)/N). Jiang et al. (2012), eq. 21.
+
+    arw : σ, deg/s/√Hz;  correlation : ρ, the same for every pair
+    """
+    return math.sqrt(q * arw**2 * (1.0 + (gyros - 1) * correlation) / gyros)
+
+
+def dc_gain(D: float, q: float, tau: float = math.inf) -> float:
+    """Gain for a constant rate, 1 - 1/(τs): below 1 for a Markov rate, which is drawn to zero."""
+    s = pole(D, q, tau)
+    return D * q / (s * (s + 1.0 / tau))
+
+
+def allan_ratio(tau: float, s: float) -> float:
+    """Allan deviation of low-passed white noise over that of the white noise itself, at averaging time τ.
+
+    √(1 - (3 - 4e^(-sτ) + e^(-2sτ))/(2sτ)) for a first-order low-pass of pole s and gain 1.
+    """
+    x = s * tau
+    return math.sqrt(1.0 - (3.0 - 4.0 * math.exp(-x) + math.exp(-2.0 * x)) / (2.0 * x))
