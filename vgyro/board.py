@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from vgyro.errors import ConfigError
 from vgyro.validation import StrictModel, parse_model
 
 FieldType = Literal["u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u64", "i64", "f32", "f64"]
@@ -24,6 +25,7 @@ class ChannelField(StrictModel):
     count: int = Field(1, ge=1, description="channels of this type")
     stride: int | None = Field(None, ge=1, description="bytes between two of `count`; null: packed")
     byte_order: ByteOrder | None = Field(None, description="null: that of the frame")
+    decimals: int | None = Field(None, ge=0, description="text: digits after the point, where they are always as many")
 
     def channels(self) -> list[str]:
         """Names of the channels that this field makes."""
@@ -53,6 +55,8 @@ class Checksum(StrictModel):
     def _has_a_place(self) -> Checksum:
         if self.family in {"crc", "sum"} and (self.span is None or (self.at is None) == (self.equals is None)):
             raise ValueError(f"a {self.family} checksum needs span, and one of at and equals")
+        if self.span is not None and not 0 <= self.span[0] < self.span[1]:
+            raise ValueError(f"span = {list(self.span)} covers no byte; it is [first, one past the last]")
         return self
 
 
@@ -83,6 +87,14 @@ class BinaryFrame(StrictModel):
             end = field.at + (field.count - 1) * (field.stride or size) + size
             if end > self.length:
                 raise ValueError(f"field {field.name!r} ends at byte {end}, after the frame's {self.length} bytes")
+        check = self.checksum
+        if check.family == "xor":
+            raise ValueError("an xor checksum is for text; a binary frame takes crc, sum or none")
+        ends = [check.span[1]] if check.span else []
+        ends += [check.at + check.width // 8] if check.at is not None else []
+        ends += [offset + len(bytes.fromhex(value)) for offset, value in self.constants.items()]
+        if ends and max(ends) > self.length:
+            raise ValueError(f"checksum or constants end at byte {max(ends)}, after the frame's {self.length} bytes")
         return self
 
 
@@ -96,6 +108,18 @@ class TextFrame(StrictModel):
     checksum: Checksum = Field(Checksum(family="none"), description="how a whole line is told from a damaged one")
     require: dict[str, int] = Field(default={}, description="field: value that marks a valid line")
     max_length: int = Field(256, ge=8, description="a longer line is damage")
+
+    @model_validator(mode="after")
+    def _can_be_read(self) -> TextFrame:
+        if self.checksum.family not in {"xor", "none"}:
+            raise ValueError(f"a {self.checksum.family} checksum is for binary frames; a text frame takes xor or none")
+        if self.checksum.family == "xor" and not self.prefix.startswith("$"):
+            raise ValueError("an xor checksum needs a prefix that begins with $")
+        known = [channel for field in self.fields for channel in field.channels()]
+        for name in self.require:
+            if name not in known:
+                raise ValueError(f"require names the field {name!r}, which the line does not have")
+        return self
 
 
 class Counter(StrictModel):
@@ -152,7 +176,12 @@ class Board(StrictModel):
     source: str = Field("", description="document that gives the layout and the scaling")
     rate_hz: float = Field(gt=0, description="frames a second, unless a recording says otherwise")
     baud: int | None = Field(None, gt=0, description="of the serial line, for information")
-    frame: Annotated[BinaryFrame | TextFrame, Field(discriminator="kind")] = Field(description="layout of a frame")
+    frame: Annotated[BinaryFrame | TextFrame, Field(discriminator="kind")] | None = Field(
+        None, description="layout of a frame; null: the board exists only as archived Parquet logs"
+    )
+    log_channels: tuple[str, ...] = Field(
+        (), description="channels of a board without frame; empty: those of its gyros and temperatures"
+    )
     counter: Counter | None = Field(None, description="null: the board sends none")
     timestamp: TimeStamp | None = Field(None, description="null: the board sends none")
     adc: Adc | None = Field(None, description="null: clipping is not looked for")
@@ -161,8 +190,19 @@ class Board(StrictModel):
 
     @property
     def channels(self) -> list[str]:
-        """Names of all channels of a frame, in the frame's order."""
-        return [channel for field in self.frame.fields for channel in field.channels()]
+        """Names of all channels: of a frame, in its order, or of the log."""
+        if self.frame is not None:
+            return [channel for field in self.frame.fields for channel in field.channels()]
+        named = [gyro.field for gyro in self.gyros] + [temperature.field for temperature in self.temperatures]
+        return list(self.log_channels or dict.fromkeys(named))
+
+    @property
+    def layout(self) -> BinaryFrame | TextFrame:
+        """The frame.  raises : ConfigError if the board exists only as archived logs"""
+        if self.frame is None:
+            remedy = "set `parquet:` for the recording, or add `frame:` to the board file"
+            raise ConfigError("has no frame: it exists only as archived Parquet logs", f"board {self.name!r}", remedy)
+        return self.frame
 
     @property
     def axes(self) -> list[str]:
@@ -175,7 +215,14 @@ class Board(StrictModel):
 
     @model_validator(mode="after")
     def _names_exist(self) -> Board:
+        if self.frame is None and (self.counter or self.timestamp):
+            raise ValueError("counter and timestamp need a frame; a log's time is named by the manifest")
+        if self.frame is not None and self.log_channels:
+            raise ValueError("log_channels is for a board without frame; a frame's fields name its channels")
         known = set(self.channels)
+        for name in self.channels:
+            if self.channels.count(name) > 1:
+                raise ValueError(f"two channels are named {name!r}")
         users = [(f"gyro {g.name!r}", g.field) for g in self.gyros]
         users += [(f"temperature {t.name!r}", t.field) for t in self.temperatures]
         users += [("counter", self.counter.field)] if self.counter else []
