@@ -27,32 +27,38 @@ def code_hash(module: str) -> str:
 
 
 def import_closure(module: str) -> frozenset[str]:
-    """Names of all modules of the package that `module` reaches, itself included."""
-    reached: set[str] = set()
-    waiting = [module]
+    """Names of all modules of the package that `module` reaches, itself included.
+
+    A package that is only passed through (a in `import a.b`) counts with what its __init__ runs at import; what it
+    loads later, on demand, counts where a name is taken from it.
+    """
+    reached: set[tuple[str, bool]] = set()
+    waiting = [(module, True)]
     while waiting:
-        name = waiting.pop()
-        if name in reached:
+        step = waiting.pop()
+        if step in reached:
             continue
-        reached.add(name)
-        waiting += _imports(name)
-    return frozenset(reached)
+        reached.add(step)
+        waiting += _imports(*step)
+        parents = step[0].split(".")[:-1]
+        waiting += [(".".join(parents[:depth]), False) for depth in range(2, len(parents) + 1)]
+    return frozenset(name for name, _ in reached)
 
 
 @cache
-def _imports(module: str) -> tuple[str, ...]:
+def _imports(module: str, on_demand: bool) -> tuple[tuple[str, bool], ...]:
     tree = ast.parse(_source(module).read_bytes())
-    found: set[str] = set()
-    for node in ast.walk(tree):
+    nodes = ast.walk(tree) if on_demand else iter(tree.body)
+    found: set[tuple[str, bool]] = set()
+    for node in nodes:
         if isinstance(node, ast.Import):
-            found.update(alias.name for alias in node.names)
+            found.update((alias.name, True) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            found.add(node.module)
-            found.update(f"{node.module}.{alias.name}" for alias in node.names)
-    names = {name for name in found if name.split(".")[0] == PACKAGE}
-    # Importing a.b.c runs a/__init__ and a.b/__init__ too.
-    names |= {".".join(name.split(".")[:depth]) for name in names for depth in range(2, name.count(".") + 1)}
-    return tuple(sorted(name for name in names if _exists(name)))
+            submodules = {f"{node.module}.{alias.name}" for alias in node.names}
+            modules = {name for name in submodules if _exists(name)}
+            found.update((name, True) for name in modules)
+            found.add((node.module, modules != submodules))
+    return tuple(sorted((name, deep) for name, deep in found if name.split(".")[0] == PACKAGE and _exists(name)))
 
 
 def _source(module: str) -> Path:
@@ -61,7 +67,7 @@ def _source(module: str) -> Path:
 
 
 def _exists(module: str) -> bool:
-    return _source(module).is_file()
+    return module.startswith(f"{PACKAGE}.") and _source(module).is_file()
 
 
 def _is_data(path: Path) -> bool:

@@ -1,0 +1,55 @@
+"""The code hash decides what runs again: it must see every module that a task can reach, and no other."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from vgyro.tasks import closure
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the package, to edit."""
+    root = tmp_path / "vgyro"
+    shutil.copytree(closure.ROOT, root, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(closure, "ROOT", root)
+    closure._imports.cache_clear()
+    yield root
+    closure._imports.cache_clear()
+
+
+def changed_by_edit(package: Path, file: str, tasks: list[str]) -> set[str]:
+    before = {task: closure.code_hash(f"vgyro.tasks.{task}") for task in tasks}
+    path = package / file
+    path.write_text(path.read_text(encoding="utf-8") + "\n# edited\n", encoding="utf-8")
+    return {task for task in tasks if closure.code_hash(f"vgyro.tasks.{task}") != before[task]}
+
+
+TASKS = ["decode", "calibrate", "convert", "garch", "dcc", "weights", "fuse", "noise", "measure", "report"]
+
+
+def test_editing_metrics_changes_the_stages_that_measure(package: Path) -> None:
+    assert changed_by_edit(package, "metrics/allan.py", TASKS) == {"noise", "measure"}
+
+
+def test_editing_the_report_changes_the_report_alone(package: Path) -> None:
+    assert changed_by_edit(package, "report/page.py", TASKS) == {"report"}
+
+
+def test_editing_a_template_changes_the_report_alone(package: Path) -> None:
+    assert changed_by_edit(package, "report/templates/page.html", TASKS) == {"report"}
+
+
+def test_editing_the_decoder_changes_decoding_alone(package: Path) -> None:
+    changed = changed_by_edit(package, "storage/dump.py", TASKS)
+    assert changed == {"decode"}
+
+
+def test_editing_units_changes_everything_that_converts(package: Path) -> None:
+    assert {"measure", "noise"} <= changed_by_edit(package, "units.py", TASKS)
+
+
+def test_imports_inside_functions_count() -> None:
+    # vgyro.engine loads the reference engine when it is asked for, not before.
+    assert "vgyro.engine.reference.garch" in closure.import_closure("vgyro.tasks.garch")
