@@ -1,0 +1,230 @@
+"""Angle random walk N, bias instability B and rate random walk K from an Allan curve, with intervals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from vgyro.metrics.allan import AllanCurve
+
+TERMS = ("N", "B", "K")
+FLICKER = 2 * math.log(2) / math.pi
+PASSES = 12
+FEWEST_POINTS = 6
+STEPS_OF_BISECTION = 14
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A coefficient and its confidence limits; low = 0 where the data do not show that it exists."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class NoiseCoefficients:
+    """N deg/s/√Hz (two-sided), B deg/s, K deg/s/√s; the fit used τ >= tau_from, s.
+
+    misfit : Σ (σ² - model)²·edf/(2 model²) a point; far above 1: the model does not describe the curve
+    """
+
+    N: Coefficient
+    B: Coefficient
+    K: Coefficient
+    tau_from: float
+    misfit: float
+    note: str = ""
+
+
+def noise_coefficients(
+    curve: AllanCurve,
+    bandwidth_hz: float | None = None,
+    dc_gain: float = 1.0,
+    replicates: int = 500,
+    seed: int = 0,
+    confidence: float | None = None,
+) -> NoiseCoefficients:
+    """Fit σ²(τ) = N²/τ + (2 ln2/π)B² + K²τ/3 by reweighted non-negative least squares, weight edf/2.
+
+    curve        : of a rate in deg/s
+    bandwidth_hz : -3 dB bandwidth of a first-order low-pass that the series went through; its effect on the white term
+                   is put into the model and τ < 2Tc is left out; None: not limited
+    dc_gain      : gain of that filter for a constant rate; all coefficients are divided by it
+    replicates   : draws for the intervals;  seed : of the draws;  confidence : None takes that of the curve
+    returns      : NoiseCoefficients, NaN with a note where the curve has fewer than 3 points
+    Without a bandwidth the shortest τ are left out while they do not fit the rest (the gyro's own low-pass, quantised
+    output). The limits invert a test: a value is inside when fits to curves drawn with it (chi² of each edf, correlated
+    between the τ as the fitted spectrum implies, the other two terms fitted again) straddle the value found. Where a fit
+    without the term would give as large a value by chance, low = 0.
+    Model: IEEE Std 952-1997, annex C.  Shape factor of the low-pass: first-order Gauss-Markov rate, Tc = 1/(2π·bandwidth).
+    """
+    confidence = curve.confidence if confidence is None else confidence
+    used = np.isfinite(curve.deviation) & (curve.edf > 0)
+    constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
+    if constant:
+        used &= curve.tau >= 2 * constant
+    if used.sum() < len(TERMS):
+        nothing = Coefficient(math.nan, math.nan, math.nan)
+        return NoiseCoefficients(nothing, nothing, nothing, math.nan, math.nan, "fewer than 3 points of the Allan curve")
+    tau, variance, edf = curve.tau[used], curve.deviation[used] ** 2, curve.edf[used]
+    if not variance.any():
+        zero = Coefficient(0.0, 0.0, 0.0)
+        return NoiseCoefficients(zero, zero, zero, float(tau[0]), 0.0, "the series is constant")
+    first = 0 if constant else _first_fitting(_columns(tau, 0.0), variance, edf, tau)
+    tau, variance, edf = tau[first:], variance[first:], edf[first:]
+    columns = _columns(tau, constant)
+    fitted = _fit(columns, variance, edf)
+    draws = _draws(tau, edf, fitted, replicates, seed)
+    limits = [_limits(columns, variance, edf, draws, term, fitted, (1 - confidence) / 2) for term in range(3)]
+    N, B, K = (
+        Coefficient(*(math.sqrt(value) / dc_gain for value in (fitted[term], *limits[term]))) for term in range(3)
+    )
+    model = columns @ fitted
+    misfit = float(np.mean((variance - model) ** 2 * edf / (2 * model**2)))
+    note = f"fitted from τ = {tau[0]:.3g} s" if first or constant else ""
+    return NoiseCoefficients(N, B, K, float(tau[0]), misfit, note)
+
+
+def model_deviation(tau: np.ndarray, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None) -> np.ndarray:
+    """Allan deviation of the fitted model at `tau` s, in deg/s."""
+    constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
+    squares = np.array([getattr(coefficients, term).value ** 2 for term in TERMS])
+    return np.sqrt(_columns(np.asarray(tau, dtype=float), constant) @ squares)
+
+
+def low_pass_factor(tau: np.ndarray, constant: float) -> np.ndarray:
+    """Allan variance of white noise after a first-order low-pass of time constant `constant` s, over that before."""
+    if constant == 0:
+        return np.ones_like(tau)
+    ratio = constant / tau
+    return 1 - ratio / 2 * (3 - 4 * np.exp(-1 / ratio) + np.exp(-2 / ratio))
+
+
+def _columns(tau: np.ndarray, constant: float) -> np.ndarray:
+    return np.column_stack([low_pass_factor(tau, constant) / tau, np.full_like(tau, FLICKER), tau / 3])
+
+
+def _solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weighted non-negative least squares, exact: all subsets of at most three columns; targets [R, M] → [R, 3]."""
+    number = columns.shape[1]
+    root = np.sqrt(weights)
+    scaled, wanted = columns * root[:, None], targets * root
+    best, cost = np.zeros((len(targets), number)), np.sum(wanted**2, axis=1)
+    for size in range(1, number + 1):
+        for subset in combinations(range(number), size):
+            part = scaled[:, subset]
+            norm = np.linalg.norm(part, axis=0)
+            values = wanted @ np.linalg.pinv(part / norm).T / norm
+            residual = np.sum((wanted - values @ part.T) ** 2, axis=1)
+            better = (values >= 0).all(axis=1) & (residual < cost)
+            cost = np.where(better, residual, cost)
+            row = np.zeros((len(targets), number))
+            row[:, subset] = values
+            best = np.where(better[:, None], row, best)
+    return best
+
+
+def _fit(columns: np.ndarray, variance: np.ndarray, edf: np.ndarray, held: tuple[int, float] | None = None) -> np.ndarray:
+    """Squared coefficients [3]; weights from the model, not the data, or low points would pull it down."""
+    free = [term for term in range(3) if held is None or term != held[0]]
+    known = columns[:, held[0]] * held[1] if held else np.zeros(len(variance))
+    scale = np.maximum(variance, np.max(variance) * 1e-12)
+    values = np.zeros(3)
+    if held:
+        values[held[0]] = held[1]
+    for _ in range(PASSES):
+        part = _solve(columns[:, free], (variance - known)[None], edf / (2 * scale**2))[0]
+        values[free] = part
+        following = np.maximum(columns @ values, 1e-6 * variance)
+        if np.allclose(following, scale, rtol=1e-9, atol=0):
+            break
+        scale = following
+    return values
+
+
+def _first_fitting(columns: np.ndarray, variance: np.ndarray, edf: np.ndarray, tau: np.ndarray) -> int:
+    """Index of the first τ that agrees with a fit to all longer τ, within 4 standard deviations or 1 % of variance."""
+    last = min(len(tau) - FEWEST_POINTS, int(np.searchsorted(tau, tau[-1] / 30)))
+    for first in range(max(last, 0)):
+        rest = slice(first + 1, None)
+        model = columns[first] @ _fit(columns[rest], variance[rest], edf[rest])
+        if abs(variance[first] / model - 1) < max(4 * math.sqrt(2 / edf[first]), 0.01):
+            return first
+    return max(last, 0)
+
+
+def _draws(tau: np.ndarray, edf: np.ndarray, squares: np.ndarray, replicates: int, seed: int) -> np.ndarray:
+    """Relative errors [R, M] of an Allan curve: chi² of each edf, joined by a Gaussian copula."""
+    from scipy.special import chdtri, ndtr
+
+    correlation = _correlation(tau, squares)
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0))
+    normal = np.random.default_rng(seed).standard_normal((replicates, len(tau))) @ root.T
+    return chdtri(edf, ndtr(-normal)) / edf
+
+
+def _correlation(tau: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """Correlation of Allan variances at different τ: ∫ S²|H₁|²|H₂|² df, S the fitted two-sided spectrum.
+
+    The covariance of two mean squares of stationary Gaussian series is 2/T times the integral of their squared
+    cross-spectrum (Parseval); the lengths cancel in the correlation.
+    """
+    frequency = np.geomspace(1 / (30 * tau[-1]), 4 / tau[0], 64 * int(np.ceil(np.log2(120 * tau[-1] / tau[0]))))
+    angular = 2 * np.pi * frequency
+    spectrum = squares[0] + squares[1] / angular + squares[2] / angular**2
+    phase = np.pi * frequency * tau[:, None]
+    response = 2 * np.sin(phase) ** 4 / phase**2 * spectrum * np.sqrt(frequency)
+    response /= np.linalg.norm(response, axis=1, keepdims=True)
+    return response @ response.T
+
+
+def _limits(
+    columns: np.ndarray,
+    variance: np.ndarray,
+    edf: np.ndarray,
+    draws: np.ndarray,
+    term: int,
+    fitted: np.ndarray,
+    tail: float,
+) -> tuple[float, float]:
+    found = float(fitted[term])
+
+    def share_below(value: float) -> float:
+        model = columns @ _fit(columns, variance, edf, (term, value))
+        drawn = _solve(columns, draws * model, edf / (2 * model**2))[:, term]
+        # A value found at zero is shared with all draws at zero; half of the ties count.
+        return float(np.mean(drawn < found) + np.mean(drawn == found) / 2) if found > 0 else float(np.mean(drawn <= 0))
+
+    start = found if found > 0 else _unit(columns, variance, term)
+    high = _crossing(share_below, start, tail, up=True)
+    if found == 0 or 1 - share_below(0.0) > tail:
+        return 0.0, high
+    return _crossing(share_below, start, 1 - tail, up=False), high
+
+
+def _unit(columns: np.ndarray, variance: np.ndarray, term: int) -> float:
+    """A value of the coefficient that would by itself make a hundredth of the lowest variance."""
+    return float(0.01 * np.min(variance / columns[:, term]))
+
+
+def _crossing(share_below, start: float, level: float, up: bool) -> float:  # type: ignore[no-untyped-def]
+    """The value at which the share of draws below the value found falls through `level`."""
+    step, near, far = 0.01, start, start
+    for _ in range(30):
+        far = near * (1 + step) if up else near / (1 + step)
+        if (share_below(far) < level) == up:
+            break
+        near, step = far, 2 * step
+    for _ in range(STEPS_OF_BISECTION):
+        middle = math.sqrt(near * far)
+        if (share_below(middle) < level) == up:
+            far = middle
+        else:
+            near = middle
+    return math.sqrt(near * far)

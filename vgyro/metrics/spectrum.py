@@ -1,0 +1,113 @@
+"""Welch amplitude density, one-sided, and the noise density read from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro import units
+from vgyro.metrics.allan import split_segments
+
+FEWEST_SAMPLES = 8
+HANN_BINS = 1.5  # equivalent noise bandwidth of the Hann window, in bins
+HANN_OVERLAP = 0.95  # independent averages per half-overlapping Hann segment (Welch 1967: 1.89 K / (2K - 1))
+LOWEST_HZ = 0.1
+HIGHEST_HZ = 10.0
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """frequency [F] Hz; density [F] in the unit of the rate per √Hz, ONE-sided; averages : Welch segments in the mean"""
+
+    frequency: np.ndarray
+    density: np.ndarray
+    averages: int
+
+
+@dataclass(frozen=True)
+class Density:
+    """A level of the spectrum, two-sided, with its limits and the band that it was read in, Hz."""
+
+    value: float
+    low: float
+    high: float
+    band: tuple[float, float]
+
+
+def spectral_density(
+    rate: np.ndarray, rate_hz: float, welch_s: float = 100.0, segment: np.ndarray | None = None
+) -> Spectrum:
+    """Amplitude density of a series by Welch's method, ONE-sided (√2 times the two-sided one).
+
+    rate    : array [T], deg/s;  welch_s : length of a Welch segment, s; cut to the longest gap-free stretch
+    segment : array [T] int, number of the gap-free stretch; power is averaged over the stretches that are long enough
+    returns : Spectrum; empty if no stretch has 8 samples
+    Hann window, half overlap, each Welch segment's mean removed.  Welch (1967), IEEE Trans. Audio Electroacoust. 15(2).
+    """
+    from scipy.signal import welch
+
+    pieces = split_segments(np.asarray(rate, dtype=float), segment)
+    longest = max((piece.size for piece in pieces), default=0)
+    if longest < FEWEST_SAMPLES:
+        return Spectrum(np.empty(0), np.empty(0), 0)
+    length = min(max(round(welch_s * rate_hz), FEWEST_SAMPLES), longest)
+    power, total = np.zeros(length // 2 + 1), 0
+    for piece in pieces:
+        if piece.size >= length:
+            averages = (piece.size - length) // (length - length // 2) + 1
+            _, part = welch(piece, rate_hz, nperseg=length, noverlap=length // 2)
+            power += averages * part
+            total += averages
+    return Spectrum(np.fft.rfftfreq(length, 1 / rate_hz), np.sqrt(power / total), total)
+
+
+def flat_band(rate_hz: float, bandwidth_hz: float | None = None) -> tuple[float, float]:
+    """Band in which the floor is read: above drift, below the roll-off of gyro and filter.
+
+    0.1 Hz to the lowest of 10 Hz, rate/10, and a quarter of the bandwidth of a filter that limits the series
+    (where a first-order low-pass has lost 3 % of the amplitude).
+    """
+    top = min(HIGHEST_HZ, rate_hz / 10, math.inf if bandwidth_hz is None else bandwidth_hz / 4)
+    return min(LOWEST_HZ, top / 3), top
+
+
+def noise_density(spectrum: Spectrum, band: tuple[float, float], confidence: float = 0.95) -> Density:
+    """Floor of the spectrum in a band, two-sided: median of the power in it, put right for the skew of chi².
+
+    Two-sided because the figure read off a plot by Jiang et al. (2012, table 2: 0.11 deg/s/√Hz beside 6.17 deg/√h) fits
+    that reading: it is then N itself. Multiply by √2 for the one-sided density. NaN where no bin is in the band.
+    """
+    inside = (spectrum.frequency >= band[0]) & (spectrum.frequency <= band[1]) & (spectrum.frequency > 0)
+    if not inside.any():
+        return Density(math.nan, math.nan, math.nan, band)
+    averages = max(spectrum.averages * HANN_OVERLAP, 1.0) if spectrum.averages > 1 else 1.0
+    freedom = 2 * averages
+    median = float(np.median(spectrum.density[inside] ** 2)) / (1 - 2 / (9 * freedom)) ** 3
+    independent = max(inside.sum() / HANN_BINS, 1.0) * averages
+    # Half the relative error of a power is that of an amplitude; a median has √(π/2) times the error of a mean.
+    error = _normal_quantile(confidence) * math.sqrt(math.pi / 2 / independent) / 2
+    value = units.two_sided(math.sqrt(median))
+    return Density(value, value * math.exp(-error), value * math.exp(error), band)
+
+
+def thinned(spectrum: Spectrum, points: int = 600) -> Spectrum:
+    """The spectrum with at most `points` frequencies: power averaged in bands of equal width on a log scale."""
+    keep = spectrum.frequency > 0
+    frequency, power = spectrum.frequency[keep], spectrum.density[keep] ** 2
+    if frequency.size <= points:
+        return Spectrum(frequency, np.sqrt(power), spectrum.averages)
+    edges = np.geomspace(frequency[0], frequency[-1] * (1 + 1e-9), points + 1)
+    band = np.searchsorted(edges, frequency, side="right")
+    starts = np.flatnonzero(np.diff(band, prepend=-1))
+    counts = np.diff(np.append(starts, frequency.size))
+    mean_power = np.add.reduceat(power, starts) / counts
+    centre = np.exp(np.add.reduceat(np.log(frequency), starts) / counts)
+    return Spectrum(centre, np.sqrt(mean_power), spectrum.averages)
+
+
+def _normal_quantile(confidence: float) -> float:
+    from scipy.special import ndtri
+
+    return float(ndtri(0.5 + confidence / 2))
