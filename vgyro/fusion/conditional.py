@@ -9,8 +9,8 @@ import numpy as np
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 
 LEVEL_IN_MOTION = (
-    "in motion the second moment of the level holds the motion itself: the weights are not those of the noise and they bias "
-    "the rate; use the definition residual"
+    "in motion the second moment of the level holds the motion itself: the weights are not those of the noise, and "
+    "they bias the rate; use the definition residual"
 )
 DEMEANED_IN_MOTION = "in motion r_t holds the motion but for its mean; use the definition residual"
 DIFFERENCE_IN_MOTION = "in motion r_t holds the change of the rate over a step; use the definition residual"
@@ -20,8 +20,8 @@ WARNINGS = {"level": LEVEL_IN_MOTION, "demeaned": DEMEANED_IN_MOTION, "differenc
 def conditional(model: str, mode: str) -> Callable[[ArrayRates, FilterParameters], Fused]:
     """The method that fuses with the weights of `model` (dcc, ccc) and `mode` (in_sample, causal).
 
-    fused rate = Σ w_i(t)·y_i(t), w(t) of min w'H_t w, Σw = 1, 0 ≤ w ≤ 1. Liu et al. (2015), eq. 15-17. Which H_t, that is
-    which definition of r_t, is named by FilterParameters.definition.
+    fused rate = Σ w_i(t)·y_i(t), w(t) of min w'H_t w, Σw = 1, 0 ≤ w ≤ 1. Liu et al. (2015), eq. 15-17. Which H_t, that
+    is which definition of r_t, is named by FilterParameters.definition.
     """
 
     def fuse(array: ArrayRates, parameters: FilterParameters) -> Fused:

@@ -90,6 +90,11 @@ def dc_gain(D: float, q: float, tau: float = math.inf) -> float:
     return D * q / (s * (s + 1.0 / tau))
 
 
+def attenuation(ratio: float) -> tuple[float, float]:
+    """Amplitude loss 1 - 1/√(1 + r²) and phase lag atan(r), rad, at r = frequency / bandwidth. Chang et al. (2012)."""
+    return 1.0 - 1.0 / math.sqrt(1.0 + ratio**2), math.atan(ratio)
+
+
 def allan_ratio(tau: float, s: float) -> float:
     """Allan deviation of low-passed white noise over that of the white noise itself, at averaging time τ.
 

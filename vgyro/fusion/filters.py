@@ -2,8 +2,8 @@
 
 One-sample convention. Jiang's discretisation (eq. 14) lets Z_k, held over the sample period, yield x_{k+1}. So it is
 kept here: x starts at x_0 = u'Z_0, each Z_k yields x_{k+1}, and the row of sample k of the fused rate holds what Z_k
-yields, as a board that sends a value for each sample does. For a slow motion it is T·e^(-sT)/(1 - e^(-sT)) late, which is
-1/s - T/2; if the value is stamped with the next sample's time, as its index k + 1 says, it is one period T later still.
+yields, as a board that sends a value for each sample does. For a slow motion that is T·e^(-sT)/(1 - e^(-sT)) late,
+about 1/s - T/2; stamped with the next sample's time, as its index k + 1 says, it would be one period T later still.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def chang_2012(array: ArrayRates, parameters: FilterParameters) -> Fused:
     s = design.pole(D, design.q_for_bandwidth(D, parameters.bandwidth_hz))
     combined = array.rate @ u
     fused = np.concatenate([low_pass(combined[part], s, 1.0, array.period) for part in array.stretches()])
-    loss = 1.0 - 1.0 / math.sqrt(1.01)
-    note = f"q from the bandwidth; amplitude loss {loss:.2%}, lag {math.degrees(math.atan(0.1)):.1f}° at BW/10; {ONE_SAMPLE}"
+    loss, lag = design.attenuation(0.1)
+    note = f"q from the bandwidth; at BW/10 amplitude loss {loss:.2%} and lag {math.degrees(lag):.1f}°; {ONE_SAMPLE}"
     return _described(fused, u, s, 1.0, array.period, note)
 
 

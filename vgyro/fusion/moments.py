@@ -1,8 +1,8 @@
 """Weights from second moments of block means: rolling, and exponentially weighted. The baselines that DCC must beat.
 
-The moment is taken about zero, as the `level` definition of r_t does: at rest it holds noise, drift and bias of the gyro;
-in motion it holds the motion as well. Where part of a recording is known to be at rest only its blocks count, and the
-weights are held through the rest of it. Blocks are counted across gaps; no block reaches over one.
+The moment is taken about zero, as the `level` definition of r_t does: at rest it holds noise, drift and bias of the
+gyro; in motion it holds the motion as well. Where part of a recording is known to be at rest only its blocks count, and
+the weights are held through the rest of it. Blocks are counted across gaps; no block reaches over one.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _positive(mass: np.ndarray) -> np.ndarray:
 
 
 def _blocks(array: ArrayRates, parameters: FilterParameters) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Block means [M, N], block of each sample [T], blocks that count [M]. The rest of a stretch belongs to its last block."""
+    """Block means [M, N], block of each sample [T], blocks that count [M]; a remainder is of the last block."""
     size = max(1, round(array.rate_hz / parameters.block_hz))
     means, used, block, number = [], [], np.full(len(array.rate), -1), 0
     standing = array.at_rest if array.at_rest.any() else np.ones(len(array.rate), dtype=bool)
@@ -103,14 +103,10 @@ def _weighted(
     sample_weights = expand_weights(weights, block)
     notes = []
     if parameters.in_motion and not array.at_rest.any():
-        notes.append(
-            "the second moment holds the motion too: the weights are not those of the noise, and they may bias the rate"
-        )
+        notes.append("in motion the second moment holds the motion: these are not the weights of the noise")
     elif parameters.in_motion:
         notes.append("moments of the rest stretches only; weights are held through the motion")
-    equal = float((~alive.any(axis=1))[block].mean())
+    equal = float(np.mean(np.append(~alive.any(axis=1), True)[block]))
     if equal > 0:
-        notes.append(
-            f"equal weights for {equal:.1%} of the samples, where fewer than {FEWEST_BLOCKS} blocks were known"
-        )
+        notes.append(f"equal weights for {equal:.1%} of the samples: fewer than {FEWEST_BLOCKS} blocks were known")
     return Fused(np.einsum("tn,tn->t", array.rate, sample_weights), sample_weights, note="; ".join(notes))

@@ -16,40 +16,36 @@ from vgyro.validation import did_you_mean
 
 LIU = "Liu et al. (2015), eq. 15-17"
 JIANG = "Jiang et al. (2012), eq. 11-14"
-WEIGHTS = ("weights",)
+XUE = "Xue et al. (2012), Measurement 45, 745-754"
+CHANG = "Chang et al. (2012), IEEE Trans. Instrum. Meas. 61, 3084-3093"
+
+
+def _conditional(model: str, mode: str, source: str) -> Method:
+    """The entry of CCC or DCC weights; in-sample weights know the rest of their window."""
+    title = f"{model.upper()} weights, {mode.replace('_', '-')}"
+    causal = mode == "causal"
+    return Method(f"{model}_{mode}", title, source, causal, ("weights",), conditional(model, mode), per_definition=True)
+
 
 _ALL = (
     Method("average", "Average", "baseline", True, (), fixed.average),
     Method("median", "Median", "baseline", True, (), fixed.median),
-    Method(
-        "inverse_variance_arw", "Inverse variance, angle random walk", "baseline: w ∝ 1/N²", False, ("arw",),
-        fixed.inverse_variance_arw,
-    ),
-    Method(
-        "inverse_variance_rrw", "Inverse variance, rate random walk", "baseline: w ∝ 1/K²", False, ("rrw",),
-        fixed.inverse_variance_rrw,
-    ),
-    Method("rolling_moment", "Rolling second moment", "baseline: w ∝ 1/m²", True, (), moments.rolling_moment),
-    Method("ewma_causal", "EWMA second moment, causal", "baseline: w ∝ 1/m²", True, (), moments.ewma_causal),
-    Method("ewma_two_sided", "EWMA second moment, two-sided", "baseline: w ∝ 1/m²", False, (), moments.ewma_two_sided),
+    Method("inverse_variance_arw", "Inverse variance, ARW", "w ∝ 1/N²", True, ("arw",), fixed.inverse_variance_arw),
+    Method("inverse_variance_rrw", "Inverse variance, RRW", "w ∝ 1/K²", True, ("rrw",), fixed.inverse_variance_rrw),
+    Method("rolling_moment", "Rolling second moment", "w ∝ 1/m²", True, (), moments.rolling_moment),
+    Method("ewma_causal", "EWMA second moment, causal", "w ∝ 1/m²", True, (), moments.ewma_causal),
+    Method("ewma_two_sided", "EWMA second moment, two-sided", "w ∝ 1/m²", False, (), moments.ewma_two_sided),
     Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), filters.jiang_markov),
     Method(
-        "jiang_random_walk", "Jiang 2012, random-walk rate", f"{JIANG} with 1/τ → 0", True, ("arw",),
-        filters.jiang_random_walk,
+        "jiang_random_walk", "Jiang 2012, random walk", f"{JIANG}, 1/τ → 0", True, ("arw",), filters.jiang_random_walk
     ),
-    Method(
-        "xue_2012", "Xue 2012, analytic covariance", "Xue et al. (2012), Measurement 45, 745-754", True, ("arw",),
-        filters.xue_2012,
-    ),
-    Method(
-        "chang_2012", "Chang 2012, q from the bandwidth", "Chang et al. (2012), IEEE Trans. Instrum. Meas. 61, 3084-3093",
-        True, ("arw",), filters.chang_2012,
-    ),
-    Method("ccc_in_sample", "CCC weights, in-sample", f"{LIU}, with a = b = 0", False, WEIGHTS, conditional("ccc", "in_sample"), True),
-    Method("ccc_causal", "CCC weights, causal", f"{LIU}, with a = b = 0, carried forward", True, WEIGHTS, conditional("ccc", "causal"), True),
-    Method("dcc_in_sample", "DCC weights, in-sample", LIU, False, WEIGHTS, conditional("dcc", "in_sample"), True),
-    Method("dcc_causal", "DCC weights, causal", f"{LIU}, carried forward", True, WEIGHTS, conditional("dcc", "causal"), True),
-)  # fmt: skip
+    Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), filters.xue_2012),
+    Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), filters.chang_2012),
+    _conditional("ccc", "in_sample", f"{LIU}, a = b = 0"),
+    _conditional("ccc", "causal", f"{LIU}, a = b = 0, carried forward"),
+    _conditional("dcc", "in_sample", LIU),
+    _conditional("dcc", "causal", f"{LIU}, carried forward"),
+)
 
 METHODS: dict[str, Method] = {method.name: method for method in _ALL}
 
