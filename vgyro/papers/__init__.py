@@ -1,0 +1,31 @@
+"""The tables and claims of the two papers as data, what follows from their equations, and how they are judged.
+
+Jiang et al. (2012), Sensors 12, 1720-1737, and Liu et al. (2015), Sensors 15, 13625-13645 (see the YAML files).
+"""
+
+from __future__ import annotations
+
+from vgyro.papers.claims import Claim, Verdict, judge
+from vgyro.papers.compare import Cell, Comparison, compare, csv_of
+from vgyro.papers.evidence import Evidence, Ours, look_up, with_single
+from vgyro.papers.implied import Implied
+from vgyro.papers.published import PAPERS, Paper, PublishedTable, load_paper
+
+__all__ = [
+    "PAPERS",
+    "Cell",
+    "Claim",
+    "Comparison",
+    "Evidence",
+    "Implied",
+    "Ours",
+    "Paper",
+    "PublishedTable",
+    "Verdict",
+    "compare",
+    "csv_of",
+    "judge",
+    "load_paper",
+    "look_up",
+    "with_single",
+]
