@@ -19,11 +19,15 @@ class VgyroError(Exception):
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
-        cure = f". {self.remedy.rstrip('.')}." if self.remedy else "."
-        return f"{place}{self.what.rstrip('.')}{cure}"
+        cure = f" {_sentence(self.remedy[:1].upper() + self.remedy[1:])}" if self.remedy else ""
+        return f"{place}{_sentence(self.what)}{cure}"
 
     def __reduce__(self) -> tuple:
         return type(self), (self.what, self.where, self.remedy)
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith(("?", "!")) else f"{text.rstrip('.')}."
 
 
 class UsageError(VgyroError):

@@ -21,8 +21,8 @@ CONFIG = Path("config/config.yaml")
 RAW = Path("raw")
 MANIFEST = "dataset.yaml"
 DATASET_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-# reports/index.html, reports/papers/ and results/twins/ belong to the workflow.
-RESERVED = ("index", "papers", "twins")
+# reports/index.html, reports/papers/, results/{twins,logs,benchmarks}/ belong to the workflow.
+RESERVED = ("benchmarks", "index", "logs", "papers", "twins")
 
 
 class Dataset(NamedTuple):
@@ -57,7 +57,7 @@ def load_datasets(
     files : the files of each recording must exist. The workflow leaves that to the decoding, which refuses the one
             recording and lets the others go on.
     """
-    config, problems = _config(Path(config_path))
+    config, problems = load_config(Path(config_path))
     config_ok = not problems
     names, missing = _names(config, Path(config_path), Path(raw_dir))
     problems += missing
@@ -102,7 +102,8 @@ def reference_file(manifest: Manifest, recording: str, folder: Path) -> Path | N
     return folder / Path(manifest.folder).expanduser() / reference.file
 
 
-def _config(path: Path) -> tuple[Config, list[Problem]]:
+def load_config(path: Path) -> tuple[Config, list[Problem]]:
+    """Read config.yaml; every default where it has a mistake."""
     try:
         return read_config(path), []
     except ConfigError as error:
