@@ -1,0 +1,28 @@
+"""Boards with known truth ("twins"), down to the bytes of a dump and its damage. See docs/twins.md."""
+
+from vgyro.simulate.closed_form import allan_minimum, expected_allan
+from vgyro.simulate.encode import encode_frames
+from vgyro.simulate.line import Damage, damage
+from vgyro.simulate.manifest import dump_name, manifest_of, manifest_yaml, reference_name
+from vgyro.simulate.recording import Simulated, dump_of, simulate_recording
+from vgyro.simulate.twin import GyroTruth, Twin, check_against_board, parse_twin, truth_of
+
+__all__ = [
+    "Damage",
+    "GyroTruth",
+    "Simulated",
+    "Twin",
+    "allan_minimum",
+    "check_against_board",
+    "damage",
+    "dump_name",
+    "dump_of",
+    "encode_frames",
+    "expected_allan",
+    "manifest_of",
+    "manifest_yaml",
+    "parse_twin",
+    "reference_name",
+    "simulate_recording",
+    "truth_of",
+]

@@ -1,0 +1,58 @@
+"""The true rate of the table that carries the board, and the plateaus of a calibration sequence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vgyro.dataset import Plateau
+from vgyro.simulate.twin import ConstantRate, Motion, RandomRate, RateTable, Rest, Sinusoid
+
+
+def reference_rate(motion: Motion, time: np.ndarray, rate_hz: float, generator: np.random.Generator) -> np.ndarray:
+    """True rate, deg/s, at `time` [T], s, sampled evenly at rate_hz."""
+    match motion:
+        case Rest():
+            return np.zeros_like(time)
+        case ConstantRate():
+            return np.full_like(time, motion.rate)
+        case Sinusoid():
+            return motion.amplitude * np.sin(2.0 * np.pi * motion.frequency_hz * time + motion.phase_rad)
+        case RandomRate():
+            return _band_limited(motion, time.size, rate_hz, generator)
+        case RateTable():
+            return _table(motion, time)
+
+
+def plateaus_of(motion: Motion) -> tuple[Plateau, ...]:
+    """The even stretches of a rate table, settling left out; none for any other motion."""
+    if not isinstance(motion, RateTable):
+        return ()
+    step = motion.settle_s + motion.plateau_s
+    return tuple(
+        Plateau(start=round(i * step + motion.settle_s, 9), stop=round((i + 1) * step, 9), rate=rate)
+        for i, rate in enumerate(motion.rates)
+    )
+
+
+def _band_limited(motion: RandomRate, samples: int, rate_hz: float, generator: np.random.Generator) -> np.ndarray:
+    """Gaussian noise, flat up to the bandwidth, nothing above; the s.d. is that of the process, not of the stretch."""
+    from scipy.fft import irfft, next_fast_len, rfftfreq
+
+    length = next_fast_len(2 * samples, real=True)
+    frequency = rfftfreq(length, 1.0 / rate_hz)
+    inside = (frequency > 0) & (frequency <= motion.bandwidth_hz)
+    spectrum = np.zeros(frequency.size, dtype=complex)
+    spectrum[inside] = generator.standard_normal(inside.sum()) + 1j * generator.standard_normal(inside.sum())
+    spectrum *= motion.sd * length / (2.0 * np.sqrt(max(inside.sum(), 1)))
+    return irfft(spectrum, length)[:samples]
+
+
+def _table(motion: RateTable, time: np.ndarray) -> np.ndarray:
+    """Half a cosine from one rate to the next during settle_s, then even; the table begins at rest."""
+    step = motion.settle_s + motion.plateau_s
+    rates = np.array([0.0, *motion.rates])
+    index = np.minimum((time / step + 1e-9).astype(int), len(motion.rates) - 1)
+    if motion.settle_s == 0:
+        return rates[index + 1]
+    share = np.clip((time - index * step) / motion.settle_s, 0.0, 1.0)
+    return rates[index] + (rates[index + 1] - rates[index]) * 0.5 * (1.0 - np.cos(np.pi * share))

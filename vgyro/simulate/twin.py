@@ -1,0 +1,316 @@
+"""config/twins/<name>.yaml as a validated model: a board whose truth is known, and the recordings to make of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from vgyro.board import Board
+from vgyro.config import Analysis, merge
+from vgyro.dataset import Kind
+from vgyro.units import arw_deg_rt_h
+from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
+
+EVERY_GYRO = "all"
+FaultKind = Literal["drift", "step", "burst", "noise", "scale", "stuck", "dropout"]
+SIZED: tuple[FaultKind, ...] = ("drift", "step", "burst", "noise", "scale")
+Correlation = Annotated[float, Field(gt=-1, lt=1)] | tuple[tuple[float, ...], ...]
+
+
+class Garch(StrictModel):
+    """Volatility of the white noise, second by second: h_t = omega + alpha · r²_{t-1} + beta · h_{t-1}."""
+
+    alpha: float = Field(ge=0, lt=1)
+    beta: float = Field(ge=0, lt=1)
+    omega: float | None = Field(None, gt=0, description="(deg/s)²; null: from arw_deg_rt_h, N²·(1 - alpha - beta)")
+
+    @model_validator(mode="after")
+    def _stationary(self) -> Garch:
+        if self.alpha + self.beta >= 1:
+            raise ValueError(f"alpha + beta = {self.alpha + self.beta:g} must be below 1: the variance has no mean")
+        return self
+
+
+class Dcc(StrictModel):
+    """Correlation of the white noise, second by second: Q_t = (1-a-b)·S + a·εε' + b·Q_{t-1}; S is `correlation`."""
+
+    a: float = Field(ge=0, lt=1)
+    b: float = Field(ge=0, lt=1)
+
+    @model_validator(mode="after")
+    def _stationary(self) -> Dcc:
+        if self.a + self.b >= 1:
+            raise ValueError(f"a + b = {self.a + self.b:g} must be below 1")
+        return self
+
+
+class GyroTruth(StrictModel):
+    """Errors of one gyro, referred to its input. Two-sided densities: see docs/twins.md."""
+
+    arw_deg_rt_h: float | None = Field(None, ge=0, description="angle random walk (white noise N), deg/√h")
+    bias_instability_deg_h: float = Field(0.0, ge=0, description="flicker coefficient B, deg/h; its Allan floor is 0.664·B")
+    rrw_deg_h_rt_h: float = Field(0.0, ge=0, description="rate random walk K, deg/h/√h")
+    bias_deg_s: float = Field(0.0, description="constant bias, deg/s")
+    scale_error: float = Field(0.0, gt=-0.5, lt=0.5, description="true sensitivity over nominal, minus 1")
+    temperature_coefficient: float = Field(0.0, description="bias per kelvin above temperature.reference_c, deg/s/K")
+    garch: Garch | None = None
+
+    @property
+    def arw(self) -> float:
+        """Angle random walk, deg/√h, given or implied by omega."""
+        if self.garch is not None and self.garch.omega is not None:
+            return arw_deg_rt_h((self.garch.omega / (1 - self.garch.alpha - self.garch.beta)) ** 0.5)
+        return self.arw_deg_rt_h or 0.0
+
+    @model_validator(mode="after")
+    def _one_white_level(self) -> GyroTruth:
+        if self.arw_deg_rt_h is not None and self.garch is not None and self.garch.omega is not None:
+            raise ValueError("arw_deg_rt_h and garch.omega both set the white noise; leave one of them out")
+        return self
+
+
+class TemperatureTruth(StrictModel):
+    """Self-heating: T(t) = start_c + rise_k · (1 - exp(-t / time_constant_s)), the same for every sensor."""
+
+    start_c: float = 25.0
+    rise_k: float = 0.0
+    time_constant_s: float = Field(600.0, gt=0)
+    noise_k: float = Field(0.0, ge=0, description="white noise of the thermometer, K per sample")
+    reference_c: float = Field(25.0, description="temperature at which the temperature coefficient adds nothing")
+
+
+class Fault(StrictModel):
+    """Something wrong with one gyro from `start` to `stop` (s; null: the end of the recording).
+
+    drift   the bias grows linearly from 0 at start to `size` deg/s at stop      step  `size` deg/s is added
+    burst   white noise of `size` deg/s per sample is added                       noise the white noise is `size` times as large
+    scale   the sensitivity changes by the ratio `size`                           stuck the count before start is repeated
+    dropout the count is 0
+    """
+
+    kind: FaultKind
+    gyro: str
+    start: float = Field(ge=0)
+    stop: float | None = None
+    size: float | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Fault:
+        if self.stop is not None and self.stop <= self.start:
+            raise ValueError(f"stop = {self.stop} s is not after start = {self.start} s")
+        if (self.kind in SIZED) != (self.size is not None):
+            need = "needs a size" if self.kind in SIZED else "takes no size"
+            raise ValueError(f"a fault of kind {self.kind} {need}")
+        return self
+
+
+class LineDamage(StrictModel):
+    """What the serial line does to a dump."""
+
+    leading_bytes: int = Field(0, ge=0, description="garbage before the first frame")
+    flips: int = Field(0, ge=0, description="single bits that are inverted")
+    drops: int = Field(0, ge=0, description="places where 1 to 4 bytes are lost")
+    insertions: int = Field(0, ge=0, description="places where 1 to 4 bytes appear")
+    missing: tuple[tuple[float, float], ...] = Field((), description="[start, stop] in s without any frame")
+    cut_tail: int = Field(0, ge=0, description="bytes missing at the end of the last frame")
+
+    @field_validator("missing")
+    @classmethod
+    def _after_the_first_frame(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        for start, stop in value:
+            if not 0 < start < stop:
+                raise ValueError(f"[{start}, {stop}] must begin after 0 and end after its begin")
+        return value
+
+
+class Rest(StrictModel):
+    kind: Literal["rest"] = "rest"
+
+
+class ConstantRate(StrictModel):
+    kind: Literal["constant"]
+    rate: float = Field(description="deg/s")
+
+
+class Sinusoid(StrictModel):
+    """rate = amplitude · sin(2π·frequency·t + phase)"""
+
+    kind: Literal["sinusoid"]
+    amplitude: float = Field(gt=0, description="deg/s")
+    frequency_hz: float = Field(gt=0)
+    phase_rad: float = 0.0
+
+
+class RandomRate(StrictModel):
+    """Gaussian, its spectrum flat up to bandwidth_hz and zero above."""
+
+    kind: Literal["random"]
+    sd: float = Field(gt=0, description="deg/s")
+    bandwidth_hz: float = Field(gt=0)
+
+
+class RateTable(StrictModel):
+    """One rate after another: the table moves smoothly for settle_s, then turns evenly for plateau_s."""
+
+    kind: Literal["rate_table"]
+    rates: tuple[float, ...] = Field(min_length=2, description="deg/s, in order")
+    settle_s: float = Field(2.0, ge=0)
+    plateau_s: float = Field(8.0, gt=0)
+
+
+Motion = Annotated[Rest | ConstantRate | Sinusoid | RandomRate | RateTable, Field(discriminator="kind")]
+
+
+class TwinRecording(StrictModel):
+    """One recording to make. A key that is also a key of the twin overrides it here (`gyros` key by key)."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+    kind: Kind
+    duration_s: float | None = Field(None, gt=0, description="s; left out with a rate table, which gives it")
+    rate_hz: float | None = Field(None, gt=0, description="null: the board's")
+    motion: Motion = Rest()
+    axis: str | None = Field(None, description="axis that turns; null: the board's only one")
+    log_reference: bool = Field(False, description="true: the manifest points at the logged rate, not at its formula")
+    counter_start: int = Field(0, ge=0, description="frame counter of the first frame")
+    gyros: dict[str, GyroTruth] = {}
+    faults: tuple[Fault, ...] = ()
+    sensor_pole_hz: float | None = Field(None, gt=0)
+    temperature: TemperatureTruth | None = None
+    line: LineDamage | None = None
+
+    @property
+    def duration(self) -> float:
+        """Length of the recording, s."""
+        if isinstance(self.motion, RateTable):
+            return len(self.motion.rates) * (self.motion.settle_s + self.motion.plateau_s)
+        assert self.duration_s is not None
+        return self.duration_s
+
+    @model_validator(mode="after")
+    def _one_length(self) -> TwinRecording:
+        if isinstance(self.motion, RateTable) == (self.duration_s is not None):
+            raise ValueError("give duration_s, except with a rate table, whose sequence has its own length")
+        if isinstance(self.motion, RateTable) != (self.kind == "calibration"):
+            raise ValueError("a calibration recording needs motion of kind rate_table, and no other kind takes it")
+        if self.kind in {"static", "thermal"} and not isinstance(self.motion, Rest):
+            raise ValueError(f"a {self.kind} recording stands still: leave motion out")
+        return self
+
+
+class Twin(StrictModel):
+    """config/twins/<name>.yaml"""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+    title: str = ""
+    notes: str = Field("", description="where the figures come from; goes into the manifest")
+    board: str = Field(description="name of a file in config/boards")
+    seed: int = Field(ge=0)
+    gyros: dict[str, GyroTruth] = Field(description="`all`, and single gyros by name: their keys go over those of `all`")
+    correlation: Correlation = Field(0.0, description="of the white noise: one factor for every pair, or the matrix")
+    slow_correlation: Correlation | None = Field(None, description="of flicker and random walk; null: as the white noise")
+    dcc: Dcc | None = None
+    sensor_pole_hz: float | None = Field(None, gt=0, description="-3 dB frequency of the sensor's one-pole low-pass, Hz")
+    temperature: TemperatureTruth = TemperatureTruth()
+    line: LineDamage = LineDamage()
+    recordings: tuple[TwinRecording, ...] = Field(min_length=1)
+    analysis: Analysis | None = Field(None, description="keys of config.yaml's `analysis` for the manifest")
+
+    def recording(self, name: str) -> TwinRecording:
+        """The recording of that name.  raises : KeyError, listing the names there are"""
+        for recording in self.recordings:
+            if recording.name == name:
+                return recording
+        raise KeyError(f"twin {self.name!r} has no recording {name!r}; it has {', '.join(r.name for r in self.recordings)}")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Twin:
+        names = [recording.name for recording in self.recordings]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two recordings are named {name!r}")
+        for recording in self.recordings:
+            for gyro in {*self.gyros, *recording.gyros}:
+                truth_of(self, recording, gyro)
+        return self
+
+
+def parse_twin(text: str, source: str) -> Twin:
+    """Validate the text of a twin file.  raises : InvalidFile, with every mistake at once"""
+    return parse_model(text, Twin, source)
+
+
+def truth_of(twin: Twin, recording: TwinRecording, gyro: str) -> GyroTruth:
+    """The errors of one gyro in one recording: `all`, then the gyro, then the recording's own of both."""
+    merged: dict = {}
+    for gyros in (twin.gyros, recording.gyros):
+        for name in (EVERY_GYRO, gyro):
+            if name in gyros:
+                merged = merge(merged, gyros[name].model_dump(exclude_unset=True))
+    return GyroTruth.model_validate(merged)
+
+
+def pole_of(twin: Twin, recording: TwinRecording) -> float | None:
+    """The sensor's pole in this recording, Hz; None: none."""
+    return recording.sensor_pole_hz if "sensor_pole_hz" in recording.model_fields_set else twin.sensor_pole_hz
+
+
+def temperature_of(twin: Twin, recording: TwinRecording) -> TemperatureTruth:
+    """The temperature in this recording."""
+    return recording.temperature or twin.temperature
+
+
+def line_of(twin: Twin, recording: TwinRecording) -> LineDamage:
+    """What the line does to this recording."""
+    return recording.line or twin.line
+
+
+def check_against_board(twin: Twin, board: Board, source: str) -> list[Problem]:
+    """Mistakes that only show when twin and board are read together."""
+    names = [gyro.name for gyro in board.gyros]
+    problems = []
+
+    def known(gyro: str, key: str) -> None:
+        if gyro not in (*names, EVERY_GYRO):
+            problems.append(Problem(source, 1, key, f"board {board.name!r} has no gyro {gyro!r}{did_you_mean(gyro, names)}"))
+
+    for gyro in twin.gyros:
+        known(gyro, f"gyros.{gyro}")
+    for key, value in (("correlation", twin.correlation), ("slow_correlation", twin.slow_correlation)):
+        problem = _matrix_problem(value, len(names))
+        if problem:
+            problems.append(Problem(source, 1, key, problem))
+    for index, recording in enumerate(twin.recordings):
+        for gyro in recording.gyros:
+            known(gyro, f"recordings.{index}.gyros.{gyro}")
+        for number, fault in enumerate(recording.faults):
+            known(fault.gyro, f"recordings.{index}.faults.{number}.gyro")
+            if fault.start >= recording.duration:
+                message = f"begins at {fault.start} s, after the end of the recording at {recording.duration} s"
+                problems.append(Problem(source, 1, f"recordings.{index}.faults.{number}", message))
+        if recording.axis is not None and recording.axis not in board.axes:
+            problems.append(
+                Problem(source, 1, f"recordings.{index}.axis", f"{recording.axis!r} is not one of {', '.join(board.axes)}")
+            )
+        if recording.axis is None and len(board.axes) > 1 and not isinstance(recording.motion, Rest):
+            message = f"says no axis for its motion; the board has {', '.join(board.axes)}"
+            problems.append(Problem(source, 1, f"recordings.{index}", message))
+    return problems
+
+
+def _matrix_problem(value: float | tuple[tuple[float, ...], ...] | None, gyros: int) -> str | None:
+    import numpy as np
+
+    if value is None:
+        return None
+    if isinstance(value, float):
+        lowest = -1.0 / (gyros - 1) if gyros > 1 else -1.0
+        return None if value > lowest else f"{value:g} for every pair of {gyros} gyros must be above {lowest:g}"
+    if {len(row) for row in value} != {gyros} or len(value) != gyros:
+        return f"expected {gyros} rows of {gyros} numbers, one for each gyro of the board"
+    matrix = np.array(value)
+    if not np.array_equal(matrix, matrix.T) or not np.all(np.diag(matrix) == 1):
+        return "a correlation matrix is symmetric and has 1 on its diagonal"
+    if np.linalg.eigvalsh(matrix).min() <= 0:
+        return "not positive definite: no set of gyros can be correlated like this"
+    return None
