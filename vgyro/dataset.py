@@ -11,6 +11,8 @@ from vgyro.config import PARTIAL, Analysis
 from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
 
 Kind = Literal["calibration", "static", "constant", "random", "sinusoid", "thermal", "free"]
+# results/<dataset>/noise/ holds the noise of each array.
+RESERVED = ("noise",)
 AT_REST: tuple[Kind, ...] = ("static", "thermal")
 
 
@@ -109,7 +111,7 @@ class Manifest(StrictModel):
     simulated: bool = Field(False, description="true: every page says so")
     twin: str | None = Field(None, description="the twin that made the data, where it is simulated")
     folder: str = Field(".", description="where the files are, from the manifest's folder")
-    gyros: tuple[str, ...] | Literal["all"] = Field("all", description="gyros to use")
+    gyros: Annotated[tuple[str, ...], Field(min_length=1)] | Literal["all"] = Field("all", description="gyros to use")
     latitude_deg: float | None = Field(None, ge=-90, le=90, description="for the Earth rate on a vertical axis")
     notes: str = Field("", description="free text, shown in the report")
     recordings: tuple[Recording, ...] = Field(min_length=1, description="the runs of the board")
@@ -121,6 +123,8 @@ class Manifest(StrictModel):
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"two recordings are named {name!r}")
+            if name in RESERVED:
+                raise ValueError(f"a recording cannot be named {name!r}: results/<dataset>/{name}/ is taken")
         return self
 
     def recording(self, name: str) -> Recording:
@@ -144,25 +148,29 @@ def used_board(manifest: Manifest, board: Board) -> Board:
 
 
 def check_against_board(manifest: Manifest, board: Board, source: str) -> list[Problem]:
-    """Mistakes that only show when manifest and board are read together."""
-    problems = []
+    """Mistakes that only show when manifest and board are read together; vgyro.validation.locate gives their lines."""
     names = [gyro.name for gyro in board.gyros]
-    for name in manifest.gyros if manifest.gyros != "all" else ():
+    problems = []
+    for index, name in enumerate(manifest.gyros if manifest.gyros != "all" else ()):
         if name not in names:
-            problems.append(
-                Problem(source, 1, "gyros", f"board {board.name!r} has no gyro {name!r}{did_you_mean(name, names)}")
-            )
+            message = f"board {board.name!r} has no gyro {name!r}{did_you_mean(name, names)}"
+            problems.append(Problem(source, 1, f"gyros.{index}", message))
     axes = used_board(manifest, board).axes
     for index, recording in enumerate(manifest.recordings):
         key = f"recordings.{index}"
-        if recording.axis is not None and recording.axis not in axes:
-            problems.append(Problem(source, 1, f"{key}.axis", f"{recording.axis!r} is not one of {', '.join(axes)}"))
-        if recording.reference is not None and recording.axis is None and len(axes) > 1:
-            problems.append(Problem(source, 1, key, f"says no axis for its reference; the board has {', '.join(axes)}"))
+        problems += [Problem(source, 1, f"{key}.{place}", text) for place, text in _axis_problems(recording, axes)]
         if recording.parquet is not None:
             known = [*board.channels, *names]
             for channel in recording.parquet.columns:
                 if channel not in known:
                     message = f"board {board.name!r} has no channel {channel!r}{did_you_mean(channel, known)}"
-                    problems.append(Problem(source, 1, f"{key}.parquet.columns", message))
+                    problems.append(Problem(source, 1, f"{key}.parquet.columns.{channel}", message))
     return problems
+
+
+def _axis_problems(recording: Recording, axes: list[str]) -> list[tuple[str, str]]:
+    if recording.axis is not None and recording.axis not in axes:
+        return [("axis", f"expected one of {', '.join(axes)}; found {recording.axis!r}")]
+    if recording.reference is not None and recording.axis is None and len(axes) > 1:
+        return [("axis", f"missing; the reference turns about one of {', '.join(axes)}")]
+    return []

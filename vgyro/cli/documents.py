@@ -1,6 +1,7 @@
 """Write config/config.yaml and docs/configuration.md from the models.
 
-`python -m vgyro.cli.documents`, in the top folder. It overwrites both; a config.yaml of your own should be kept elsewhere first.
+`python -m vgyro.cli.documents`, in the top folder. It overwrites both: keep a config.yaml of your
+own elsewhere first.
 """
 
 from __future__ import annotations

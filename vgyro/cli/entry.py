@@ -9,6 +9,7 @@ import argparse
 import importlib
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from typing import NoReturn
 
@@ -68,6 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except KeyboardInterrupt:
         return INTERRUPTED
+    except Exception as error:
+        traceback.print_exc()
+        print(f"vgyro: a bug: {type(error).__name__}: {error}", file=sys.stderr)
+        return BUG_EXIT_CODE
 
 
 def _run(given: list[str]) -> int:

@@ -8,7 +8,7 @@ from vgyro.board import Board, parse_board
 from vgyro.config import Config, parse_config
 from vgyro.dataset import Manifest, check_against_board, parse_manifest, used_board
 from vgyro.errors import ConfigError
-from vgyro.validation import InvalidFile, Problem, did_you_mean
+from vgyro.validation import InvalidFile, Problem, did_you_mean, locate
 
 BOARDS = Path("config/boards")
 
@@ -49,7 +49,7 @@ def read_dataset(path: str | Path, boards: Path = BOARDS) -> tuple[Manifest, Boa
         raise InvalidFile([Problem(source, _line(text, "board"), "board", error.what)]) from None
     problems = check_against_board(manifest, board, source)
     if problems:
-        raise InvalidFile(problems)
+        raise InvalidFile(locate(problems, text))
     return manifest, used_board(manifest, board)
 
 
