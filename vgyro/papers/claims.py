@@ -16,8 +16,10 @@ from pydantic import Field, model_validator
 from vgyro.papers.evidence import Evidence, Ours, look_up
 from vgyro.validation import StrictModel
 
-HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be decided"
 Outcome = Literal["holds", "does not hold", "cannot be decided"]
+HOLDS: Outcome = "holds"
+FAILS: Outcome = "does not hold"
+OPEN: Outcome = "cannot be decided"
 Selection = dict[str, str | int | bool]
 EACH = "$each"
 
@@ -54,7 +56,7 @@ class ValueRule(Bounded):
 
 
 class RatioRule(Bounded):
-    """One figure over another. The interval takes the two as independent, which is wider than the truth: they share noise."""
+    """One figure over another. The interval takes the two as independent; they share noise, so that it is too wide."""
 
     kind: Literal["ratio"]
     of: Selection
@@ -92,7 +94,7 @@ class Claim(StrictModel):
     text: str
     where: str
     rule: Rule
-    comment: dict[Outcome, str] = {}
+    comment: dict[Outcome, str] = Field({})
 
 
 @dataclass(frozen=True)
@@ -119,13 +121,13 @@ def _judge_rule(rule: Any, evidence: Evidence, implied: Mapping[str, float]) -> 
         return _decide(rule, Ours(implied[rule.figure]))
     if isinstance(rule, RatioRule):
         return _decide(rule, ratio(look_up(evidence, rule.of), look_up(evidence, rule.to)))
-    if EACH not in rule.figure.values():
+    each = [key for key, value in rule.figure.items() if value == EACH]
+    if not each:
         return _decide(rule, look_up(evidence, rule.figure))
     if not evidence.gyros:
         return Verdict(OPEN, f"{rule.means}: no gyros are known")
     return _all([
-        _decide(rule, look_up(evidence, {key: gyro if value == EACH else value for key, value in rule.figure.items()}), gyro)
-        for gyro in evidence.gyros
+        _decide(rule, look_up(evidence, {**rule.figure, **dict.fromkeys(each, gyro)}), gyro) for gyro in evidence.gyros
     ])  # fmt: skip
 
 
@@ -147,7 +149,8 @@ def _decide(rule: Bounded, figure: Ours, of: str = "") -> Verdict:
 
 def _all(parts: list[Verdict]) -> Verdict:
     """The worst part decides; its reason is the reason."""
-    for outcome in (FAILS, OPEN):
+    outcomes: tuple[Outcome, ...] = (FAILS, OPEN)
+    for outcome in outcomes:
         worst = [part for part in parts if part.outcome == outcome]
         if worst:
             more = f" (and {len(worst) - 1} more of {len(parts)} like it)" if len(worst) > 1 else ""
@@ -157,7 +160,7 @@ def _all(parts: list[Verdict]) -> Verdict:
 
 
 def ratio(of: Ours, to: Ours) -> Ours:
-    """One figure over another, limits by independent relative half-widths in quadrature; no limits if either has none."""
+    """One figure over another, limits by independent relative half-widths in quadrature; none if either has none."""
     for part in (of, to):
         if not part.known:
             return part

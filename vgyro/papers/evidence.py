@@ -47,8 +47,8 @@ class Ours:
 def look_up(evidence: Evidence, select: Mapping[str, Any]) -> Ours:
     """Find the figure that a selection names.
 
-    select : `artefact`; `value`, `low`, `high` = columns to read (default those names); `unit` where the artefact has no
-             such column; `absolute` = true for the magnitude; every other key is a column that must be equal
+    select : `artefact`; `value`, `low`, `high` = columns to read (default those names); `unit` where the artefact
+             has no such column; `absolute` = true for the magnitude; every other key is a column that must be equal
     raises : DataError if several rows fit
     """
     wanted = {key: _named(value, evidence.gyros) for key, value in select.items()}

@@ -1,7 +1,8 @@
 """Closed forms: what the equations of the two papers imply for the numbers in their tables. Nothing here is typed in.
 
 Notation of Jiang et al. (2012): N = angle random walk of a gyro, deg/s/√Hz, two-sided; D = 1'R⁻¹1; q = process noise,
-deg²/s³; τ = time constant of the Markov rate model, s; s = √(1/τ² + Dq), rad/s: the filter is a low-pass of corner s.
+deg²/s³; τ = time constant of the Markov rate model, s; s = √(1/τ² + Dq), rad/s: the filter is a low-pass of pole s.
+The filter's own formulas (D, s, bandwidth, gain, Allan ratio) are those of vgyro.fusion.design.
 """
 
 from __future__ import annotations
@@ -20,41 +21,14 @@ class Implied:
     how: str
 
 
-def information(arw: float, gyros: int, correlation: float = 0.0) -> float:
-    """D = 1'R⁻¹1 of identical gyros with one correlation factor, Hz/(deg/s)² (J eq. 6, 10).
-
-    arw : deg/s/√Hz, two-sided
-    """
-    return gyros / (arw**2 * (1.0 + (gyros - 1) * correlation))
+def alike(arw: float, gyros: int, correlation: float = 0.0) -> np.ndarray:
+    """R of identical gyros with one correlation factor, (deg/s)²/Hz (J eq. 6).  arw : deg/s/√Hz, two-sided"""
+    return arw**2 * ((1.0 - correlation) * np.eye(gyros) + correlation)
 
 
-def corner(d: float, q: float, tau: float = math.inf) -> float:
-    """s = √(1/τ² + Dq), rad/s; τ = ∞ is the random-walk model (J eq. 15)."""
-    return math.sqrt((0.0 if math.isinf(tau) else 1.0 / tau**2) + d * q)
-
-
-def bandwidth_hz(s: float) -> float:
-    """-3 dB bandwidth of the filter, Hz (J eq. 18)."""
-    return s / (2.0 * math.pi)
-
-
-def dc_gain(s: float, tau: float = math.inf) -> float:
-    """|H(0)| = 1 - 1/(τs) (J eq. 16); 1 for a random walk."""
-    return 1.0 - (0.0 if math.isinf(tau) else 1.0 / (tau * s))
-
-
-def noise_for_bandwidth(bandwidth: float, q: float, gyros: int) -> float:
+def noise_for_bandwidth(bandwidth_hz: float, q: float, gyros: int) -> float:
     """σ_n at which q gives this bandwidth, deg/s/√Hz: N gyros, uncorrelated (J eq. 19 solved for σ_n)."""
-    return math.sqrt(gyros * q) / (2.0 * math.pi * bandwidth)
-
-
-def low_pass_allan_ratio(s: float, averaging: float = 1.0) -> float:
-    """Allan deviation of white noise after a first-order low-pass of corner s and DC gain 1, over that before it.
-
-    √(1 - (3 - 4e^-x + e^-2x)/(2x)), x = s · averaging time: METRICS' shape factor with Tc = 1/s.
-    """
-    x = s * averaging
-    return math.sqrt(1.0 - (3.0 - 4.0 * math.exp(-x) + math.exp(-2.0 * x)) / (2.0 * x))
+    return math.sqrt(gyros * q) / (2.0 * math.pi * bandwidth_hz)
 
 
 def allan_minimum(white: float, walk: float) -> float:

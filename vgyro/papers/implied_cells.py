@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from vgyro.fusion import design
 from vgyro.papers import implied as forms
 from vgyro.papers.implied import Implied
 from vgyro.papers.published import Paper, PublishedTable
@@ -21,7 +22,9 @@ Address = tuple[int | str, str, str]
 TAU, Q_STATIC, Q_DYNAMIC = 500.0, 0.0772, 1.9290
 DYNAMIC_RATE_HZ, SENSOR_HZ = 500.0, 40.0
 SINE_DEG_S, SINE_HZ = 62.8, 0.25
-READ_AT = 1.0
+GYROS, READ_AT = 6, 1.0
+# A correlation factor to show that the bandwidth depends on it.
+STRONG = 0.5
 
 
 def implied_cells(paper: Paper) -> dict[Address, Implied]:
@@ -39,13 +42,17 @@ def implied_cells(paper: Paper) -> dict[Address, Implied]:
 def implied_figures(paper: Paper) -> dict[str, float]:
     """Figures that decide claims without any recording: name → value."""
     if paper.name == "jiang2012":
-        d = forms.information(_single_arw(paper), 6)
-        s, walk = forms.corner(d, Q_STATIC, TAU), forms.corner(d, Q_STATIC)
-        correlated = forms.corner(forms.information(_single_arw(paper), 6, 0.5), Q_STATIC, TAU)
-        return {"bandwidth_gain_of_markov": s / walk - 1.0, "bandwidth_ratio_of_correlation": correlated / s}
+        d = _information(paper)
+        correlated = design.information(forms.alike(_single_arw(paper), GYROS, STRONG))
+        return {
+            "bandwidth_gain_of_markov": design.bandwidth(d, Q_STATIC, TAU) / design.bandwidth(d, Q_STATIC) - 1.0,
+            "bandwidth_ratio_of_correlation": design.bandwidth(correlated, Q_STATIC) / design.bandwidth(d, Q_STATIC),
+        }
     names = {"Mean": "if_mean", "1σ": "if_sigma", "ARW": "if_arw", "Bias Drift": "if_bias_drift"}
     table = paper.table(3)
-    return {name: float(_singles(table, column).mean() / table.number_at("DCC", column)) for column, name in names.items()}
+    return {
+        name: float(_singles(table, column).mean() / table.number_at("DCC", column)) for column, name in names.items()
+    }
 
 
 def jiang_correlation(paper: Paper) -> np.ndarray:
@@ -56,6 +63,10 @@ def jiang_correlation(paper: Paper) -> np.ndarray:
 
 def _single_arw(paper: Paper) -> float:
     return arw_deg_s_rt_hz(paper.table(2).number_at("ARW", "Single gyroscope"))
+
+
+def _information(paper: Paper) -> float:
+    return design.information(forms.alike(_single_arw(paper), GYROS))
 
 
 def _jiang(paper: Paper) -> Callable[[PublishedTable, str, str], Implied]:
@@ -73,18 +84,21 @@ def _jiang_static(paper: Paper, row: str, column: str) -> Implied:
     table, arw = paper.table(2), _single_arw(paper)
     correlation = jiang_correlation(paper)
     factor, rho = forms.average_factor(correlation), forms.mean_correlation(correlation)
-    s = forms.corner(forms.information(arw, 6), Q_STATIC, TAU)
     single = column == "Single gyroscope"
     filtered = column in {"Random walk", "1st order Markov"}
-    gain = forms.dc_gain(s, TAU if column == "1st order Markov" else math.inf) if filtered else 1.0
+    tau = TAU if column == "1st order Markov" else math.inf
+    d = _information(paper)
+    s, gain = design.pole(d, Q_STATIC, tau), design.dc_gain(d, Q_STATIC, tau) if filtered else 1.0
     white = arw if single else arw * factor
     how = "the printed ARW" if single else f"the printed ARW × √((1 + 5·{rho:.3f})/6), mean correlation of Table 1"
     if row == "Noise Density":
-        return Implied(white * gain, f"{how}, / 60, two-sided" + (f"; gain {gain:.4f} at low frequency" if filtered else ""))
+        return Implied(
+            white * gain, f"{how}, / 60, two-sided" + (f"; gain {gain:.4f} at low frequency" if filtered else "")
+        )
     if row == "ARW":
         drift_of = "Single gyroscope" if single else "Simple average"
         walk, minimum = table.number_at("RRW", drift_of), table.number_at("Bias Drift", drift_of)
-        shape = forms.low_pass_allan_ratio(s, READ_AT) if filtered else 1.0
+        shape = design.allan_ratio(READ_AT, s) if filtered else 1.0
         read = gain * forms.allan_reading(white, rrw_deg_s_rt_s(walk), deg_s(minimum), shape, READ_AT)
         low_pass = f"; σ(1 s) behind a low-pass of s = {s:.3f} rad/s is {shape:.3f} of it" if filtered else ""
         return Implied(arw_deg_rt_h(read), f"{how}, and the printed drift, at 1 s{low_pass}")
@@ -92,20 +106,23 @@ def _jiang_static(paper: Paper, row: str, column: str) -> Implied:
         return Implied(None, "a property of the authors' gyroscopes, from which the rest follows")
     if not filtered:
         return Implied(None, "the correlation of the drifts is not published")
-    return Implied(table.number_at(row, "Simple average") * gain, f"that of the average × gain at zero frequency {gain:.4f}")
+    return Implied(
+        table.number_at(row, "Simple average") * gain, f"that of the average × gain at zero frequency {gain:.4f}"
+    )
 
 
 def _jiang_dynamic(paper: Paper, row: str, column: str) -> Implied:
     arw, factor = _single_arw(paper), forms.average_factor(jiang_correlation(paper))
     tau = TAU if row == "1st order Markov" else math.inf
-    s = forms.corner(forms.information(arw, 6), Q_DYNAMIC, tau)
+    d = _information(paper)
+    s, gain = design.pole(d, Q_DYNAMIC, tau), design.dc_gain(d, Q_DYNAMIC, tau)
     if column == "Random rate: 1σ":
         return Implied(None, "the random rate is not published")
     if row == "Single gyroscope":
         return _jiang_single(column, forms.one_pole_sigma(arw, SENSOR_HZ))
-    runs = forms.SampledFilter(s, 1.0 / DYNAMIC_RATE_HZ, forms.dc_gain(s, tau), SENSOR_HZ)
+    runs = forms.SampledFilter(s, 1.0 / DYNAMIC_RATE_HZ, gain, SENSOR_HZ)
     noise = runs.noise_sigma(arw * factor)
-    bandwidth = f"bandwidth {forms.bandwidth_hz(s):.2f} Hz"
+    bandwidth = f"bandwidth {design.bandwidth(d, Q_DYNAMIC, tau):.2f} Hz"
     if column == "Constant rate: Mean":
         mean = paper.table(3).number_at("Single gyroscope", column)
         return Implied(mean * runs.gain, f"mean of the single gyroscopes × gain {runs.gain:.5f}")
@@ -171,7 +188,9 @@ def _liu_virtual(paper: Paper, row: str, column: str) -> Implied:
         return Implied(float(singles.mean()), how)
     if not average:
         if column == "Bias Drift":
-            return Implied(table.number_at("Simple average", column), "that of the average: a filter of gain 1 passes drift")
+            return Implied(
+                table.number_at("Simple average", column), "that of the average: a filter of gain 1 passes drift"
+            )
         return Implied(None, "the parameters of this filter are not published")
     if column == "Bias Drift":
         return Implied(None, "the correlation of the drifts is not published")

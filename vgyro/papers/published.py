@@ -24,7 +24,7 @@ class Heading(StrictModel):
 
     name: str
     unit: str | None = None
-    select: Selection = {}
+    select: Selection = Field({})
 
 
 class Variant(StrictModel):
@@ -33,7 +33,7 @@ class Variant(StrictModel):
     name: str
     columns: tuple[str, ...] | None = Field(None, description="columns that it covers; null: all")
     rows: tuple[str, ...] | None = Field(None, description="rows that it covers; null: all")
-    select: Selection = {}
+    select: Selection = Field({})
 
 
 class PublishedTable(StrictModel):
@@ -44,7 +44,7 @@ class PublishedTable(StrictModel):
     where: str
     note: str = ""
     unit: str | None = None
-    select: Selection = {}
+    select: Selection = Field({})
     rows: tuple[Heading, ...]
     columns: tuple[Heading, ...]
     values: tuple[tuple[str | None, ...], ...]
@@ -108,7 +108,10 @@ class Paper(StrictModel):
 
 @cache
 def load_paper(name: str) -> Paper:
-    """Read one of PAPERS from the package's data.  raises : KeyError for another name; InvalidFile if the data are wrong"""
+    """Read one of PAPERS from the package's data.
+
+    raises : KeyError for another name; InvalidFile if the data are wrong
+    """
     if name not in PAPERS:
         raise KeyError(f"no paper {name!r}; known: {', '.join(PAPERS)}")
     text = resources.files("vgyro.papers").joinpath(f"{name}.yaml").read_text(encoding="utf-8")
