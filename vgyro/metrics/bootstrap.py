@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +51,7 @@ def make_units(rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = No
     length = max(round(UNIT_S * rate_hz), 1)
     borders = [0, samples] if segment is None else [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), samples]
     starts: list[int] = []
-    for start, stop in zip(borders, borders[1:], strict=False):
+    for start, stop in itertools.pairwise(borders):
         starts += [start + index * length for index in range(max((stop - start) // length, 1 if stop > start else 0))]
     at = np.array(starts, dtype=np.int64)
     count = np.diff(np.append(at, samples)).astype(float)
@@ -67,7 +68,7 @@ def make_units(rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = No
 
 def _differences_valid(samples: int, length: int, borders: list[int]) -> np.ndarray:
     valid = np.zeros(samples, dtype=bool)
-    for start, stop in zip(borders, borders[1:], strict=False):
+    for start, stop in itertools.pairwise(borders):
         valid[start : max(stop - 2 * length + 1, start)] = True
     return valid
 
@@ -125,9 +126,8 @@ def _block_sums(values: np.ndarray, starts: np.ndarray, block: int) -> np.ndarra
     return np.stack([sums[row].sum(axis=0) for row in starts])
 
 
-def percentile_limits(found: np.ndarray, replicates: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Limits [S] from replicates [R, S], by the percentiles of the replicates."""
-    del found
+def percentile_limits(replicates: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
+    """Limits [S] by the percentiles of replicates [R, S]."""
     tail = (1 - confidence) / 2
     low, high = np.quantile(replicates, [tail, 1 - tail], axis=0)
     return low, high

@@ -59,9 +59,9 @@ def noise_coefficients(
     returns      : NoiseCoefficients, NaN with a note where the curve has fewer than 3 points
     Without a bandwidth the shortest τ are left out while they do not fit the rest (the gyro's own low-pass, quantised
     output). The limits invert a test: a value is inside when fits to curves drawn with it (chi² of each edf, correlated
-    between the τ as the fitted spectrum implies, the other two terms fitted again) straddle the value found. Where a fit
-    without the term would give as large a value by chance, low = 0.
-    Model: IEEE Std 952-1997, annex C.  Shape factor of the low-pass: first-order Gauss-Markov rate, Tc = 1/(2π·bandwidth).
+    between the τ as the fitted spectrum implies, the other two terms fitted again) straddle the value found. Where a
+    fit without the term would give as large a value by chance, low = 0.
+    Model: IEEE Std 952-1997, annex C.  Low-pass: first-order Gauss-Markov rate, Tc = 1/(2π·bandwidth).
     """
     confidence = curve.confidence if confidence is None else confidence
     used = np.isfinite(curve.deviation) & (curve.edf > 0)
@@ -70,7 +70,9 @@ def noise_coefficients(
         used &= curve.tau >= 2 * constant
     if used.sum() < len(TERMS):
         nothing = Coefficient(math.nan, math.nan, math.nan)
-        return NoiseCoefficients(nothing, nothing, nothing, math.nan, math.nan, "fewer than 3 points of the Allan curve")
+        return NoiseCoefficients(
+            nothing, nothing, nothing, math.nan, math.nan, "fewer than 3 points of the Allan curve"
+        )
     tau, variance, edf = curve.tau[used], curve.deviation[used] ** 2, curve.edf[used]
     if not variance.any():
         zero = Coefficient(0.0, 0.0, 0.0)
@@ -129,7 +131,9 @@ def _solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray) -> np.
     return best
 
 
-def _fit(columns: np.ndarray, variance: np.ndarray, edf: np.ndarray, held: tuple[int, float] | None = None) -> np.ndarray:
+def _fit(
+    columns: np.ndarray, variance: np.ndarray, edf: np.ndarray, held: tuple[int, float] | None = None
+) -> np.ndarray:
     """Squared coefficients [3]; weights from the model, not the data, or low points would pull it down."""
     free = [term for term in range(3) if held is None or term != held[0]]
     known = columns[:, held[0]] * held[1] if held else np.zeros(len(variance))

@@ -19,7 +19,7 @@ HIGHEST_HZ = 10.0
 
 @dataclass(frozen=True)
 class Spectrum:
-    """frequency [F] Hz; density [F] in the unit of the rate per √Hz, ONE-sided; averages : Welch segments in the mean"""
+    """frequency [F] Hz; density [F], unit of the rate per √Hz, ONE-sided; averages : Welch segments in the mean"""
 
     frequency: np.ndarray
     density: np.ndarray

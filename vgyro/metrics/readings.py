@@ -1,0 +1,126 @@
+"""The figures that the two papers read off a static test, each with its limits, next to the fitted ones."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vgyro import units
+from vgyro.metrics.allan import AllanCurve, read_curve
+from vgyro.metrics.bootstrap import Resampled, Units, percentile_limits
+from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, low_pass_factor
+from vgyro.metrics.figures import Reading
+from vgyro.metrics.spectrum import Spectrum, flat_band, noise_density
+
+K_AT_TAU = 3.0  # s: there the slope +1/2 line equals K
+BEYOND_MINIMUM = 2.0
+BAND_LIMITED = 0.98
+FEWEST_FREEDOM = 1.0
+
+
+def paper_readings(
+    curve: AllanCurve,
+    spectrum: Spectrum,
+    coefficients: NoiseCoefficients,
+    rate_hz: float,
+    bandwidth_hz: float | None = None,
+) -> dict[str, Reading]:
+    """Noise density, ARW, RRW, bias drift and bias instability of one series in the units of the field.
+
+    curve, spectrum, coefficients : of the series, in deg/s
+    bandwidth_hz : -3 dB bandwidth of a filter that the series went through; None: none
+    returns : noise_density deg/s/√Hz (two-sided), arw_1s and arw deg/√h, rrw_read and rrw deg/h/√h, bias_drift and
+              bias_instability deg/h, bias_drift_tau s
+    Jiang et al. (2012), table 2; Liu et al. (2015), table 3; IEEE Std 952-1997 for the fitted terms.
+    """
+    density = noise_density(spectrum, flat_band(rate_hz, bandwidth_hz), curve.confidence)
+    drift, drift_tau = bias_drift(curve)
+    return {
+        "noise_density": Reading(density.value, density.low, density.high, _density_note(density.value, density.band)),
+        "arw_1s": _arw_at_one_second(curve, bandwidth_hz),
+        "arw": _fitted(coefficients.N, units.arw_deg_rt_h, coefficients.note),
+        "rrw_read": rrw_read(curve),
+        "rrw": _fitted(coefficients.K, units.rrw_deg_h_rt_h, coefficients.note),
+        "bias_drift": drift,
+        "bias_drift_tau": drift_tau,
+        "bias_instability": _fitted(coefficients.B, units.deg_h, coefficients.note),
+    }
+
+
+def moments(sums: Units, resampled: Resampled, series: int, confidence: float) -> dict[str, Reading]:
+    """Mean and 1σ of one series, deg/s, with the limits of the moving-block bootstrap."""
+    count = sums.count.sum()
+    mean = sums.total[:, series].sum() / count
+    centred = sums.squares[:, series] - 2 * mean * sums.total[:, series] + sums.count * mean**2
+    sigma = math.sqrt(max(centred.sum(), 0.0) / max(count - 1, 1))
+    note = f"bootstrap of blocks of {resampled.block} s"
+    readings = {}
+    for name, value, replicates in (("mean", mean, resampled.mean), ("sigma", sigma, resampled.sigma)):
+        low, high = percentile_limits(replicates[:, [series]], confidence)
+        readings[name] = Reading(float(value), float(low[0]), float(high[0]), note)
+    return readings
+
+
+def bias_drift(curve: AllanCurve) -> tuple[Reading, Reading]:
+    """Lowest point of the curve, deg/h, and its τ, s; limits are those of the curve at that τ."""
+    usable = curve.edf >= FEWEST_FREEDOM
+    index = int(np.argmin(np.where(usable, curve.deviation, np.inf))) if usable.any() else 0
+    falls = index == len(curve.tau) - 1 or not usable[index + 1 :].any()
+    note = "the curve still falls at its end: an upper limit of the floor" if falls else ""
+    low, value, high = (float(units.deg_h(row[index])) for row in (curve.low, curve.deviation, curve.high))
+    tau = float(curve.tau[index])
+    return Reading(value, low, high, note), Reading(tau, math.nan, math.nan, note)
+
+
+def rrw_read(curve: AllanCurve) -> Reading:
+    """K read with a slope +1/2 line, deg/h/√h: least squares of log σ = log K + ½ log(τ/3), weight edf.
+
+    The line goes through the points from twice the τ of the minimum to the end. If they span less than an octave the
+    curve does not rise: the line then goes through the last octave and K is an upper limit. Limits: chi² with the
+    weighted mean of the edf, because neighbouring points are nearly the same data.
+    """
+    usable = (curve.edf >= FEWEST_FREEDOM) & (curve.deviation > 0)
+    if not usable.any():
+        return Reading(0.0, 0.0, 0.0, "the series is constant")
+    tau, deviation, edf = curve.tau[usable], curve.deviation[usable], curve.edf[usable]
+    start = BEYOND_MINIMUM * tau[int(np.argmin(deviation))]
+    rises = bool(tau[-1] >= 2 * start)
+    line = tau >= (start if rises else tau[-1] / 2)
+    weight = edf[line] / edf[line].sum()
+    value = math.exp(float(weight @ (np.log(deviation[line]) - np.log(tau[line] / K_AT_TAU) / 2)))
+    value = float(units.rrw_deg_h_rt_h(value))
+    low, high = _chi2_limits(value, float(weight @ edf[line]), curve.confidence)
+    span = f"line through τ = {tau[line][0]:.3g} to {tau[-1]:.3g} s"
+    return Reading(value, low, high, span) if rises else Reading(value, 0.0, high, f"no rise, an upper limit; {span}")
+
+
+def _arw_at_one_second(curve: AllanCurve, bandwidth_hz: float | None) -> Reading:
+    value, low, high = (float(units.arw_deg_rt_h(read)) for read in read_curve(curve, 1.0))
+    note = "" if math.isfinite(value) else "the curve does not reach τ = 1 s"
+    if bandwidth_hz:
+        kept = math.sqrt(float(low_pass_factor(np.array([1.0]), 1 / (2 * math.pi * bandwidth_hz))[0]))
+        if kept < BAND_LIMITED:
+            note = f"band-limited: the filter by itself lowers σ(1 s) to {kept:.2f} of the white level"
+    return Reading(value, low, high, note)
+
+
+def _density_note(value: float, band: tuple[float, float]) -> str:
+    if not math.isfinite(value):
+        return f"no frequency of the spectrum lies in {band[0]:.3g}-{band[1]:.3g} Hz"
+    return f"two-sided, {band[0]:.3g}-{band[1]:.3g} Hz; one-sided {units.one_sided(value):.4g}"
+
+
+def _fitted(coefficient: Coefficient, convert, note: str) -> Reading:  # type: ignore[no-untyped-def]
+    value, low, high = (float(convert(number)) for number in (coefficient.value, coefficient.low, coefficient.high))
+    if low == 0 and math.isfinite(high) and high > 0:
+        note = f"not shown to exist: < {high:.4g}" + (f"; {note}" if note else "")
+    return Reading(value, low, high, note)
+
+
+def _chi2_limits(value: float, freedom: float, confidence: float) -> tuple[float, float]:
+    from scipy.special import chdtri
+
+    tail = (1 - confidence) / 2
+    low, high = (value * math.sqrt(freedom / chdtri(freedom, share)) for share in (tail, 1 - tail))
+    return low, high
