@@ -1,0 +1,37 @@
+"""ARCH-LM, GARCH, DCC, the constant-correlation test, and what surrounds them: series, definitions of r_t, windows."""
+
+from vgyro.engine.models import DccFit, GarchFit
+from vgyro.volatility.arch_lm import ArchLm, arch_lm, kurtosis
+from vgyro.volatility.dcc import Test, constant_correlation_test, dcc_correlation, fit_ccc, fit_dcc
+from vgyro.volatility.garch import fit_garch, garch_from_parameters, garch_variance
+from vgyro.volatility.rolling import ModelWindow, RollingWeights, rolling_weights
+from vgyro.volatility.series import Series, block_means, detrended, residuals, window_residuals
+from vgyro.volatility.stretches import Window, longest_stretch, stretches, windows
+
+__all__ = [
+    "ArchLm",
+    "DccFit",
+    "GarchFit",
+    "ModelWindow",
+    "RollingWeights",
+    "Series",
+    "Test",
+    "Window",
+    "arch_lm",
+    "block_means",
+    "constant_correlation_test",
+    "dcc_correlation",
+    "detrended",
+    "fit_ccc",
+    "fit_dcc",
+    "fit_garch",
+    "garch_from_parameters",
+    "garch_variance",
+    "kurtosis",
+    "longest_stretch",
+    "residuals",
+    "rolling_weights",
+    "stretches",
+    "window_residuals",
+    "windows",
+]

@@ -45,11 +45,11 @@ def fit_garch(r: np.ndarray) -> GarchFit:
         scales.append(scale)
     omega, alpha, beta = np.array([fit.parameters for fit in fits]).reshape(-1, 3).T
     stderr = np.array([fit.stderr for fit in fits]).reshape(-1, 3)
-    scale = np.array(scales)
-    stderr[:, 0] *= scale
-    variance = garch_variance(r, omega * scale, alpha, beta)
+    size = np.array(scales)
+    stderr[:, 0] *= size
+    variance = garch_variance(r, omega * size, alpha, beta)
     return GarchFit(
-        omega=omega * scale,
+        omega=omega * size,
         alpha=alpha,
         beta=beta,
         stderr=stderr,

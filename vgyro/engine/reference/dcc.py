@@ -1,0 +1,237 @@
+"""DCC(1,1): the correlation likelihood of pymgarch in NumPy, maximised by SLSQP; two-step errors by pymgarch.
+
+pymgarch's own recursion is plain Python, 20-30 ms an evaluation and seconds a window, so the likelihood is computed by
+vgyro.engine.recursions (the same to rounding, by test) and handed to pymgarch's `two_stage_vcov`. `fit_by_pymgarch`
+runs pymgarch itself, for tests and for the cross-check of sampled windows.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.engine.models import (
+    BOUNDARY,
+    BOUNDARY_MARGIN,
+    CONVERGED,
+    EIGENVALUE_MIN,
+    FAILED,
+    NOT_POSITIVE_DEFINITE,
+    ONE_GYRO,
+    PERSISTENCE_MAX,
+    TOO_SHORT,
+    DccFit,
+    GarchFit,
+)
+from vgyro.engine.recursions import (
+    correlation_target,
+    dcc_correlation,
+    dcc_log_likelihood,
+    dcc_score,
+    garch_variance,
+)
+
+MIN_SAMPLES = 20
+ZERO = 1e-6
+"""a or b below this is 0."""
+A_NEAR_ZERO = 1e-3
+"""a below this has no usable standard error: b is all but unidentified."""
+STARTS = ((0.02, 0.95), (0.05, 0.90), (0.10, 0.80))
+LARGEST = 0.999
+INFEASIBLE = 1e10
+HESSIAN_STEP = 1e-4
+
+
+def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None = None) -> DccFit:
+    """Fit DCC(1,1) to z [T, N]. See vgyro.volatility.fit_dcc for the conventions."""
+    z = np.asarray(z, dtype=float)
+    samples, n = z.shape
+    if n < 2:
+        return _without_dynamics(z, np.eye(n), ONE_GYRO)
+    if not np.all(np.isfinite(z)):
+        return _without_dynamics(z, np.eye(n), FAILED)
+    if samples < max(MIN_SAMPLES, n + 2):
+        return _without_dynamics(z, np.eye(n), TOO_SHORT)
+    target = correlation_target(z)
+    if np.linalg.eigvalsh(target)[0] < EIGENVALUE_MIN:
+        return _without_dynamics(z, np.eye(n), NOT_POSITIVE_DEFINITE)
+    a, b, ended_well = _maximise(z, target)
+    if a <= ZERO:
+        return _without_dynamics(z, target, BOUNDARY if ended_well else FAILED)
+    nothing = np.full(2, np.nan)
+    hessian, robust, status = nothing, nothing, BOUNDARY if ended_well else FAILED
+    if ended_well and a >= A_NEAR_ZERO and b > ZERO and a + b < PERSISTENCE_MAX - ZERO:
+        status = CONVERGED
+        hessian = _hessian_stderr(z, a, b, target)
+        if margins is not None and r is not None:
+            if np.all(margins.status == CONVERGED):
+                robust = _two_step_stderr(np.asarray(r, dtype=float), margins, z, a, b, target)
+            else:
+                status = BOUNDARY_MARGIN
+    return DccFit(
+        a=a,
+        b=b,
+        stderr=robust,
+        stderr_hessian=hessian,
+        target=target,
+        log_likelihood=float(dcc_log_likelihood(z, a, b, target).sum()),
+        log_likelihood_ccc=float(dcc_log_likelihood(z, 0.0, 0.0, target).sum()),
+        correlation=dcc_correlation(z, a, b, target),
+        status=status,
+    )
+
+
+def fit_ccc(z: np.ndarray) -> DccFit:
+    """Constant conditional correlation: DCC with a = b = 0, nothing to optimise."""
+    z = np.asarray(z, dtype=float)
+    n = z.shape[1]
+    if n < 2:
+        return _without_dynamics(z, np.eye(n), ONE_GYRO)
+    if not np.all(np.isfinite(z)):
+        return _without_dynamics(z, np.eye(n), FAILED)
+    target = correlation_target(z)
+    singular = np.linalg.eigvalsh(target)[0] < EIGENVALUE_MIN
+    return _without_dynamics(z, np.eye(n) if singular else target, NOT_POSITIVE_DEFINITE if singular else CONVERGED)
+
+
+def _without_dynamics(z: np.ndarray, target: np.ndarray, status: str) -> DccFit:
+    value = float(dcc_log_likelihood(z, 0.0, 0.0, target).sum()) if np.all(np.isfinite(z)) else np.nan
+    return DccFit(
+        a=0.0,
+        b=0.0,
+        stderr=np.full(2, np.nan),
+        stderr_hessian=np.full(2, np.nan),
+        target=target,
+        log_likelihood=value,
+        log_likelihood_ccc=value,
+        correlation=np.broadcast_to(target, (len(z), *target.shape)).copy(),
+        status=status,
+    )
+
+
+def _maximise(z: np.ndarray, target: np.ndarray) -> tuple[float, float, bool]:
+    """Best (a, b) over three starts and a = b = 0; and whether the optimiser ended well."""
+    from scipy.optimize import minimize
+
+    def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
+        try:
+            value, gradient = dcc_score(z, float(x[0]), float(x[1]), target)
+        except np.linalg.LinAlgError:
+            return INFEASIBLE, np.zeros(2)
+        return -value, -gradient
+
+    stationary = {
+        "type": "ineq",
+        "fun": lambda x: PERSISTENCE_MAX - x[0] - x[1],
+        "jac": lambda _: np.array([-1.0, -1.0]),
+    }
+    best, best_cost = (0.0, 0.0), -float(dcc_log_likelihood(z, 0.0, 0.0, target).sum())
+    ended_well = False
+    for start in STARTS:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            result = minimize(
+                cost,
+                start,
+                jac=True,
+                method="SLSQP",
+                bounds=[(0.0, LARGEST)] * 2,
+                constraints=[stationary],
+                options={"maxiter": 300, "ftol": 1e-9},
+            )
+        # 8: no step improves the likelihood any more, which at this tolerance is the optimum to rounding.
+        good = result.status in (0, 8)
+        ended_well = ended_well or good
+        if good and result.x[0] > ZERO and result.fun < best_cost:
+            best, best_cost = (float(result.x[0]), max(float(result.x[1]), 0.0)), float(result.fun)
+    return best[0], min(best[1], PERSISTENCE_MAX - best[0]), ended_well
+
+
+def _hessian_stderr(z: np.ndarray, a: float, b: float, target: np.ndarray) -> np.ndarray:
+    """Square roots of the diagonal of the inverse negative Hessian, by central differences of the gradient."""
+    hessian = np.empty((2, 2))
+    room = min(a, b, (1 - a - b) / 2)
+    step = min(HESSIAN_STEP, room / 2)
+    for j, move in enumerate(np.eye(2) * step):
+        _, above = dcc_score(z, a + move[0], b + move[1], target)
+        _, below = dcc_score(z, a - move[0], b - move[1], target)
+        hessian[:, j] = -(above - below) / (2 * step)
+    return _root_of_diagonal(np.linalg.pinv((hessian + hessian.T) / 2))
+
+
+def _root_of_diagonal(covariance: np.ndarray) -> np.ndarray:
+    diagonal = np.diagonal(covariance)
+    return np.where(diagonal > 0, np.sqrt(np.abs(diagonal)), np.nan)
+
+
+class _Margins:
+    """The GARCH margins as pymgarch's two_stage_vcov asks for them, each in units of its own mean square."""
+
+    def __init__(self, r: np.ndarray, margins: GarchFit, z: np.ndarray) -> None:
+        scale = np.mean(np.square(r), axis=0)
+        self._e = r / np.sqrt(scale)
+        self._parameters = np.stack([margins.omega / scale, margins.alpha, margins.beta], axis=1)
+        self.std_resid = z
+        self.nobs, self.nassets = r.shape
+        self.total_params = self._parameters.size
+
+    def n_params(self, _series: int) -> int:
+        return 3
+
+    def full_params(self, series: int) -> np.ndarray:
+        return self._parameters[series].copy()
+
+    def per_obs_loglik(self, series: int, parameters: np.ndarray) -> np.ndarray:
+        variance = self._variance(series, parameters)
+        return -0.5 * (np.log(2 * np.pi) + np.log(variance) + np.square(self._e[:, series]) / variance)
+
+    def std_resid_at(self, series: int, parameters: np.ndarray) -> np.ndarray:
+        return self._e[:, series] / np.sqrt(self._variance(series, parameters))
+
+    def _variance(self, series: int, parameters: np.ndarray) -> np.ndarray:
+        omega, alpha, beta = parameters[:, None]
+        return garch_variance(self._e[:, [series]], omega, alpha, beta)[:, 0]
+
+
+@dataclass(frozen=True)
+class _SecondStage:
+    """The second-stage fit as pymgarch's two_stage_vcov asks for it."""
+
+    params: np.ndarray
+    layout: object
+
+
+def _two_step_stderr(
+    r: np.ndarray, margins: GarchFit, z: np.ndarray, a: float, b: float, target: np.ndarray
+) -> np.ndarray:
+    """Robust standard errors of (a, b) that count the estimation of the margins (Engle & Sheppard 2001)."""
+    from pymgarch.estimation import ParamLayout
+    from pymgarch.inference import two_stage_vcov
+
+    def likelihood(x: np.ndarray, moved: np.ndarray) -> np.ndarray | None:
+        try:
+            return dcc_log_likelihood(moved, float(x[0]), float(x[1]), target)
+        except np.linalg.LinAlgError:
+            return None
+
+    stage = _SecondStage(np.array([a, b]), ParamLayout(asymmetric=False, studentt=False))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            found = two_stage_vcov(_Margins(r, margins, z), stage, llt_fn=likelihood)
+        except RuntimeError:
+            return np.full(2, np.nan)
+    # Its fallback for a singular matrix ignores the margins: not the figure that was asked for.
+    return found["se"] if found["method"] == "two-stage-robust" else np.full(2, np.nan)
+
+
+def fit_by_pymgarch(z: np.ndarray) -> tuple[float, float, float]:
+    """(a, b, L_c) by pymgarch's own stage-2 fit of z [T, N]: slow, independent of the code above."""
+    from pymgarch.estimation import ParamLayout, fit_stage2
+
+    z = np.ascontiguousarray(z, dtype=float)
+    fit = fit_stage2(z, ParamLayout(asymmetric=False, studentt=False))
+    constant = 0.5 * (z.size * np.log(2 * np.pi) + np.sum(np.square(z)))
+    return float(fit.params[0]), float(fit.params[1]), float(fit.llt.sum() + constant)

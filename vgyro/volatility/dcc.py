@@ -1,0 +1,94 @@
+"""DCC(1,1) of an array of gyros, CCC, and the test of constant correlation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro import engine as engines
+from vgyro.engine import recursions
+from vgyro.engine.models import EIGENVALUE_MIN, DccFit, GarchFit
+from vgyro.volatility.garch import _two_dimensional
+
+dcc_correlation = recursions.dcc_correlation
+
+
+def fit_dcc(
+    z: np.ndarray, engine: str = "reference", r: np.ndarray | None = None, margins: GarchFit | None = None
+) -> DccFit:
+    """Fit Q_t = (1-a-b)S + a z_{t-1}z'_{t-1} + b Q_{t-1} by maximising the correlation likelihood.
+
+    z       : [T, N] standardised residuals e/√h
+    engine  : name of the engine (vgyro.engine)
+    r       : [T, N] deg/s, the series before it was standardised, and
+    margins : their GarchFit: with both, `stderr` holds the two-step robust standard errors; without, NaN
+    returns : DccFit
+    raises  : TooShort if there is no sample at all; EngineError if the engine is unknown
+
+    Conventions. S = z'z/T scaled to unit diagonal (the mean is zero), Q_1 = S, 1/T throughout; a >= 0, b >= 0,
+    a + b < 1. L_c has no constant: -½Σ(log|R| + z'R⁻¹z - z'z). Where a is 0, b is not identified: a = b = 0, status
+    `boundary`. The two-step standard errors (Engle & Sheppard 2001) hold S fixed; the inverse-Hessian ones take the
+    margins as known and are 1.4 to 2.3 times too small on short windows. There are none for a < 0.001, and no
+    two-step ones where a margin is at its boundary (status `boundary margin`).
+    S singular: status `not positive definite`, and the identity stands for S and for every R_t. N = 1: `one gyro`.
+    Engle (2002); Liu et al. (2015), eq. 4-13.
+    """
+    return engines.get(engine).dcc.fit_dcc(_two_dimensional(z), r=r, margins=margins)
+
+
+def fit_ccc(z: np.ndarray, engine: str = "reference") -> DccFit:
+    """Constant conditional correlation: DCC with a = b = 0 (Bollerslev 1990). z [T, N]; statuses as in fit_dcc."""
+    return engines.get(engine).dcc.fit_ccc(_two_dimensional(z))
+
+
+@dataclass(frozen=True)
+class Test:
+    """statistic; dof = lags + 1; p_value under chi²(lags + 1), as published; p_value_s under chi²(lags)."""
+
+    statistic: float
+    dof: int
+    p_value: float
+    p_value_s: float
+
+
+# pytest would take a class of this name, imported into a test module, for a test.
+Test.__test__ = False  # type: ignore[attr-defined]
+
+
+def constant_correlation_test(z: np.ndarray, lags: int = 1) -> Test:
+    """Test of constant against changing correlation.
+
+    z       : [T, N] standardised residuals of the CCC fit
+    lags    : s, lags of the regression
+    returns : Test; NaN for one gyro, a singular correlation, or fewer than lags + 3 samples
+
+    z is whitened by the symmetric root of the sample correlation; the products above the diagonal of z_t z_t', all
+    pairs stacked, are regressed on a constant and s of their own lags; δ'X'Xδ/σ̂², σ̂² = mean squared residual, is chi²(s + 1)
+    in the paper. Whitening by the SAMPLE correlation forces the constant to zero, so at T = 360, s = 1 a nominal 5 %
+    test rejects 1.8 % under chi²(s + 1) and 5.5 % under chi²(s): both p-values are returned. Its power against
+    (a, b) = (.03, .95) at T = 360 is about 40 %.
+    Engle & Sheppard (2001), NBER 8554, section 3.3; Liu et al. (2015), eq. 14.
+    """
+    from scipy.special import chdtrc
+
+    z = _two_dimensional(z)
+    samples, n = z.shape
+    nothing = Test(np.nan, lags + 1, np.nan, np.nan)
+    if n < 2 or samples < lags + 3 or not np.all(np.isfinite(z)):
+        return nothing
+    values, vectors = np.linalg.eigh(recursions.correlation_target(z))
+    if values[0] < EIGENVALUE_MIN:
+        return nothing
+    white = z @ ((vectors / np.sqrt(values)) @ vectors.T)
+    first, second = np.triu_indices(n, 1)
+    products = white[:, first] * white[:, second]
+    response = products[lags:].ravel()
+    design = np.stack(
+        [np.ones_like(response)] + [products[lags - lag : samples - lag].ravel() for lag in range(1, lags + 1)], axis=1
+    )
+    moments = np.einsum("ij,ik->jk", design, design)
+    coefficients = np.linalg.solve(moments, np.einsum("ij,i->j", design, response))
+    rest = response - (design * coefficients).sum(axis=1)
+    statistic = float(coefficients @ moments @ coefficients / np.mean(np.square(rest)))
+    return Test(statistic, lags + 1, float(chdtrc(lags + 1, statistic)), float(chdtrc(lags, statistic)))

@@ -1,0 +1,54 @@
+"""GARCH(1,1) of each gyro."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vgyro import engine as engines
+from vgyro.engine import recursions
+from vgyro.engine.models import GarchFit
+from vgyro.errors import TooShort
+
+garch_variance = recursions.garch_variance
+
+
+def fit_garch(r: np.ndarray, engine: str = "reference") -> GarchFit:
+    """Fit h_t = ω + α e²_{t-1} + β h_{t-1} to each gyro by Gaussian quasi maximum likelihood.
+
+    r       : [T, N] deg/s, one series a column; the model's mean is zero
+    engine  : name of the engine (vgyro.engine)
+    returns : GarchFit; ω in (deg/s)²
+    raises  : TooShort if there is no sample at all; EngineError if the engine is unknown
+
+    Conventions. ω > 0, α >= 0, β >= 0, α + β < 1. The recursion starts at ε_0² = h_0 = mean(e²), so that
+    h_1 = ω + (α + β)·mean(e²) (Fiorentini, Calzolari & Panattoni 1996). Each series is divided by its own r.m.s.
+    first. Several starts, the best likelihood wins, and no start depends on another series or window. Where α is 0, β
+    is not identified: the model is then the constant variance ω = mean(e²), α = β = 0, status `boundary`; a fit with
+    α > 0 is kept only if its likelihood is better. Standard errors are Bollerslev & Wooldridge's robust ones, NaN at
+    the boundary and where α < 0.001.
+    A series that does not vary, is too short or holds NaN gets a status and NaN, never an exception.
+    Bollerslev (1986); Liu et al. (2015), eq. 1.
+    """
+    r = _two_dimensional(r)
+    return engines.get(engine).garch.fit_garch(r)
+
+
+def _two_dimensional(r: np.ndarray) -> np.ndarray:
+    r = np.asarray(r, dtype=float)
+    if r.ndim != 2:
+        raise TypeError(f"r has {r.ndim} dimensions; expected [T, N]")
+    if len(r) == 0:
+        raise TooShort("the series holds no sample", remedy="Give at least 50 samples")
+    return r
+
+
+def garch_from_parameters(
+    r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray
+) -> GarchFit:
+    """A GarchFit from stored parameters: h_t and likelihood computed again, no standard errors.
+
+    r [T, N] must be the series that was fitted: the start of the recursion is its mean square.
+    """
+    variance = garch_variance(r, omega, alpha, beta)
+    likelihood = recursions.garch_log_likelihood(r, variance)
+    return GarchFit(omega, alpha, beta, np.full((r.shape[1], 3), np.nan), likelihood, variance, status)
