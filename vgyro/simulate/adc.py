@@ -16,8 +16,9 @@ def channel_counts(
 
     rates : [T, N], deg/s, referred to the input;  scale_error : [N];  temperature : [T], °C
     count = bias + sign · (1 + scale error) · rate / scale, rounded to the nearest, held at the rails.
+    raises : ConfigError for a board without frames
     """
-    kinds = {channel: field.type for field in board.frame.fields for channel in field.channels()}
+    kinds = {channel: field.type for field in board.layout.fields for channel in field.channels()}
     counts: dict[str, np.ndarray] = {}
     for index, gyro in enumerate(board.gyros):
         exact = gyro.bias + gyro.sign * (1.0 + scale_error[index]) * rates[:, index] / gyro.scale

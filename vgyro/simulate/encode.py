@@ -1,4 +1,4 @@
-"""Counts → bytes of frames, for every declared board. Written apart from the decoder, so that each can test the other."""
+"""Counts → bytes of frames, for every declared board. Written apart from the decoder, so that each tests the other."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def encode_frames(
     counter : [T], frame number without wraps; it is wrapped, and stepped, as the board does
     counts  : channel → [T]; a channel that is left out is 0 (or what the frame requires there)
     time    : [T], s, for the time stamp of a board that sends one; None: counter / board.rate_hz
-    raises  : DataError for a channel that the board lacks or a value that does not fit its field
+    raises  : DataError for a channel that the board lacks or a value that does not fit its field; ConfigError for a
+              board that sends no frames
     """
     return encode(board, counter, counts, time).data
 
@@ -42,17 +43,20 @@ def encode(
     values = {name: np.asarray(value) for name, value in counts.items()}
     for name in values:
         if name not in board.channels:
-            raise DataError(f"board {board.name!r} has no channel {name!r}", remedy=f"it has {', '.join(board.channels)}")
+            raise DataError(
+                f"board {board.name!r} has no channel {name!r}", remedy=f"it has {', '.join(board.channels)}"
+            )
     if board.counter is not None:
         values[board.counter.field] = counter * board.counter.step % board.counter.modulus
     if board.timestamp is not None:
         clock = counter / board.rate_hz if time is None else np.asarray(time)
         ticks = np.rint(clock / board.timestamp.tick_s).astype(np.int64)
         values[board.timestamp.field] = ticks % board.timestamp.wrap if board.timestamp.wrap else ticks
-    if isinstance(board.frame, BinaryFrame):
-        frames = _binary(board.frame, values, counter.size)
-        return Encoded(frames.tobytes(), np.arange(counter.size, dtype=np.int64) * board.frame.length)
-    return _text(board.frame, values, counter.size)
+    frame = board.layout
+    if isinstance(frame, BinaryFrame):
+        frames = _binary(frame, values, counter.size)
+        return Encoded(frames.tobytes(), np.arange(counter.size, dtype=np.int64) * frame.length)
+    return _text(frame, values, counter.size)
 
 
 def _binary(frame: BinaryFrame, values: Mapping[str, np.ndarray], size: int) -> np.ndarray:
@@ -162,7 +166,7 @@ def _text(frame: TextFrame, values: Mapping[str, np.ndarray], size: int) -> Enco
             if whole and size:
                 to_bytes(column, field.type, "big", channel)
             columns.append(column.astype(np.int64 if whole else np.float64).tolist())
-            formats.append("%d" if whole else "%.6f")
+            formats.append("%d" if whole else f"%.{6 if field.decimals is None else field.decimals}f")
     prefix = frame.prefix
     if prefix and not prefix.endswith(frame.separator):
         prefix += frame.separator

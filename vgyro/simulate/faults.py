@@ -45,7 +45,14 @@ def faults_of(
         for index, name in enumerate(gyros):
             if fault.gyro in (name, EVERY_GYRO) and last > first:
                 laid.active[first:last, index] = True
-                _lay(laid, fault, slice(first, last), index, (time[first:last] - fault.start) / (stop - fault.start), generators)
+                _lay(
+                    laid,
+                    fault,
+                    slice(first, last),
+                    index,
+                    (time[first:last] - fault.start) / (stop - fault.start),
+                    generators,
+                )
     return laid
 
 

@@ -17,7 +17,7 @@ def dump_name(recording: str) -> str:
 
 
 def reference_name(recording: TwinRecording) -> str | None:
-    """File name of the logged rate of a recording; None where the manifest gives the rate by a formula, or it stands still."""
+    """File name of the logged rate of a recording; None where it stands still or the manifest gives a formula."""
     logged = isinstance(recording.motion, RandomRate) or recording.log_reference
     return f"{recording.name}_reference.parquet" if logged else None
 

@@ -30,8 +30,10 @@ class Volatility:
 
 @dataclass(frozen=True)
 class White:
-    """noise : [T, N], deg/s;  sd : [M, N], deg/s, conditional s.d. √h of the mean of each second, that is N in deg/s/√Hz;
-    block_index : [T], second of each sample"""
+    """noise : [T, N], deg/s;  block_index : [T], second of each sample
+
+    sd : [M, N], deg/s, conditional s.d. √h of the mean of each second, which is the density N in deg/s/√Hz
+    """
 
     noise: np.ndarray
     sd: np.ndarray
@@ -50,13 +52,13 @@ def modulated_white(unit: np.ndarray, rate_hz: float, volatility: Volatility) ->
 
     unit : [T, N], independent standard normal numbers u_k;  rate_hz : samples a second
 
-    Second t has n samples. z_t = Σ u_k / √n is standard normal, and so is every z_t given the past. The recursion runs
-    on ε_t = R_t^½ z_t, r_t = √h_t ε_t:
-        h_t = ω + α r²_{t-1} + β h_{t-1}        Q_t = (1-a-b) S + a ε_{t-1}ε'_{t-1} + b Q_{t-1}      (Liu et al. 2015, eq. 1, 4-6)
+    Second t has n samples. z_t = Σ u_k / √n is standard normal, and so is every z_t given the past. The recursion
+    (Liu et al. 2015, eq. 1, 4-6) runs on ε_t = R_t^½ z_t, r_t = √h_t ε_t:
+        h_t = ω + α r²_{t-1} + β h_{t-1}        Q_t = (1-a-b) S + a ε_{t-1}ε'_{t-1} + b Q_{t-1}
     with R_t = diag(Q_t)^-½ Q_t diag(Q_t)^-½, R^½ its Cholesky factor, h_1 = ω/(1-α-β), Q_1 = S. Then every sample of
     second t is √rate · D_t R_t^½ u_k. Its mean over the second is D_t R_t^½ z_t = r_t, exactly, when rate_hz is a whole
-    number (else up to √(rate_hz/n)); within the second the noise is white, of density √h_t and of the same correlation. So there is
-    nothing to interpolate, and the reading at any τ is consistent with that at 1 s.
+    number (else up to √(rate_hz/n)); within the second the noise is white, of density √h_t and of the same correlation.
+    So there is nothing to interpolate, and the reading at any τ is consistent with that at 1 s.
     """
     samples, gyros = unit.shape
     index = np.floor(np.arange(samples) * BLOCK_HZ / rate_hz + 1e-9).astype(np.int64)
@@ -75,7 +77,7 @@ def modulated_white(unit: np.ndarray, rate_hz: float, volatility: Volatility) ->
 
 
 def _volatility_path(z: np.ndarray, volatility: Volatility) -> tuple[np.ndarray, np.ndarray]:
-    """Conditional s.d. [M, N] and Cholesky factor of the correlation [M, N, N] of each block, from unit noise z [M, N]."""
+    """From unit noise z [M, N]: s.d. [M, N] and Cholesky factor of the correlation [M, N, N] of each second."""
     blocks, gyros = z.shape
     v = volatility
     sd = np.empty((blocks, gyros))
@@ -99,10 +101,10 @@ def unit_flicker(samples: int, generator: np.random.Generator) -> np.ndarray:
     """Flicker noise with B = 1: two-sided density 1/(2πf); [T], mean zero over the stretch.
 
     Independent normal Fourier coefficients of the right variance at every bin of a stretch twice as long, of which the
-    first half is kept: the density is exact at the bins k/(2·T·samples), from 1/(2·duration) to half the rate, and the
-    end does not join the start. What lies below 1/(2·duration) looks like a constant over the stretch; the mean is taken out, so that it
-    is the constant bias alone. The overlapping Allan deviation is 0.664 within 1 % from 16 samples on, and within 4 % up to a
-    tenth of the stretch (expectation over many stretches; a single hour scatters by a third at its longest τ).
+    first half is kept: the density is exact from 1/(2·duration) to half the rate, and the end does not join the start.
+    What lies below 1/(2·duration) looks like a constant over the stretch; the mean is taken out, so that it is the
+    constant bias alone. The Allan deviation of many stretches is 0.664 within 2 % from 8 samples to a tenth of the
+    stretch; that of a single one scatters, at a tenth by a sixth.
     """
     from scipy.fft import irfft, next_fast_len
 
@@ -127,9 +129,10 @@ def unit_random_walk(samples: int, rate_hz: float, generator: np.random.Generato
 
 
 def one_pole(signal: np.ndarray, pole_hz: float, rate_hz: float) -> np.ndarray:
-    """First-order Butterworth low-pass along axis 0: gain 1 at rest, -3 dB at pole_hz, delay 1/(2·rate·tan(π·pole/rate)).
+    """First-order Butterworth low-pass along axis 0: gain 1 at rest, -3 dB at pole_hz.
 
-    Bilinear, prewarped; begins in the steady state of the first sample.  raises : ValueError if pole_hz >= rate_hz / 2
+    Bilinear, prewarped; delay at low frequency 1/(2·rate·tan(π·pole/rate)); begins in the steady state of the first
+    sample.  raises : ValueError if pole_hz >= rate_hz / 2
     """
     from scipy.signal import butter, lfilter, lfilter_zi
 

@@ -41,7 +41,7 @@ class Simulated:
     rates     : [T, N], deg/s, what each gyro would show if its scale were known: before ADC, `stuck` and `dropout`
     counts    : channel → [T], what the board sends: whole numbers, but for channels that the board sends as floats
     bias      : [T, N], deg/s, slowly varying error (constant, flicker, random walk, temperature, drift and step faults)
-    sd        : [M, N], deg/s/√Hz, density of the white noise in each second; √h where there is volatility, faults left out
+    sd        : [M, N], deg/s/√Hz, density of the white noise in each second, √h; faults left out
     white_sd  : [T, N], deg/s a sample, of the white noise before the sensor's pole, faults in
     faulty    : [T, N], true while a fault is active
     temperature : [T], °C;   plateaus : of a rate table, settling left out
@@ -65,9 +65,10 @@ class Simulated:
 def simulate_recording(twin: Twin, board: Board, recording: str, seed: int | None = None) -> Simulated:
     """Make one recording; the same numbers whether alone or with the others.
 
-    Every recording, gyro and kind of noise has a stream of its own, keyed by the names, so that adding a recording or a gyro changes no other.
+    Every recording, gyro and kind of noise has a stream of its own, keyed by the names: adding a recording or a gyro
+    changes no other.
     seed   : instead of the twin's
-    raises : KeyError if the twin has no such recording; DataError if it is too short to hold a sample
+    raises : ConfigError if the twin has no such recording; DataError if it is too short to hold a sample
     """
     spec = twin.recording(recording)
     streams = _Streams(twin.seed if seed is None else seed, recording)
@@ -92,9 +93,20 @@ def simulate_recording(twin: Twin, board: Board, recording: str, seed: int | Non
     counts = channel_counts(board, rates, [truth.scale_error for truth in truths], shown, faults)
     white_sd = np.sqrt(rate_hz) * white.sd[white.block_index] * faults.noise_gain
     return Simulated(
-        recording, rate_hz, tuple(names), time, reference, rates, counts, bias, white.sd, np.hypot(white_sd, faults.burst_sd),
-        faults.active, temperature, plateaus_of(spec.motion),
-    )  # fmt: skip
+        recording=recording,
+        rate_hz=rate_hz,
+        gyros=tuple(names),
+        time=time,
+        reference=reference,
+        rates=rates,
+        counts=counts,
+        bias=bias,
+        sd=white.sd,
+        white_sd=np.hypot(white_sd, faults.burst_sd),
+        faulty=faults.active,
+        temperature=temperature,
+        plateaus=plateaus_of(spec.motion),
+    )
 
 
 def dump_of(simulated: Simulated, board: Board, twin: Twin, seed: int | None = None) -> tuple[bytes, list[Damage]]:
@@ -116,15 +128,14 @@ def dump_of(simulated: Simulated, board: Board, twin: Twin, seed: int | None = N
     encoded = encode(board, spec.counter_start + rows[kept], counts, simulated.time[kept])
     generator = _Streams(twin.seed if seed is None else seed, simulated.recording).of(LINE)
     data, done = damage(encoded.data, line, generator, encoded.starts, rows[kept])
-    places = [int(encoded.starts[np.searchsorted(rows[kept], first) - 1]) for first, _ in missing]
-    gaps = [
-        Damage("missing", place, first, f"{count} frames") for (first, count), place in zip(missing, places, strict=True)
-    ]
-    return data, sorted([*done, *gaps], key=lambda item: item.offset)
+    for first, count in missing:
+        before = int(encoded.starts[np.searchsorted(rows[kept], first) - 1])
+        done.append(Damage("missing", before, first, f"{count} frames"))
+    return data, sorted(done, key=lambda item: item.offset)
 
 
 def truth_table(simulated: Simulated, board: Board, rate_hz: float = TRUTH_HZ) -> dict[str, Any]:
-    """Columns of the `truth` schema, one row every 1/rate_hz s; a fault counts if it is active at any sample of a row."""
+    """Columns of the `truth` schema, one row every 1/rate_hz s; a fault at any sample of a row counts."""
     step = max(round(simulated.rate_hz / rate_hz), 1)
     starts = np.arange(0, simulated.time.size, step)
     columns: dict[str, Any] = {"time": simulated.time[starts], "reference": simulated.reference[starts]}
@@ -181,7 +192,7 @@ def _slow(
 def _output(
     twin: Twin, board: Board, spec: TwinRecording, reference: np.ndarray, white: White, faults: Faults, rate_hz: float
 ) -> np.ndarray:
-    """Rate and white noise behind the sensor's pole, [T, N]; gyros on another axis than the one that turns see no rate."""
+    """Rate and white noise behind the sensor's pole, [T, N]; only gyros on the axis that turns see the rate."""
     axis = spec.axis or board.axes[0]
     turning = np.array([gyro.axis == axis for gyro in board.gyros], dtype=float)
     fast = np.outer(reference, turning) + white.noise * faults.noise_gain + faults.burst

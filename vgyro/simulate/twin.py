@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from vgyro.board import Board
 from vgyro.config import Analysis, merge
 from vgyro.dataset import Kind
+from vgyro.errors import ConfigError
 from vgyro.units import arw_deg_rt_h
 from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
 
@@ -49,7 +50,7 @@ class GyroTruth(StrictModel):
     """Errors of one gyro, referred to its input. Two-sided densities: see docs/twins.md."""
 
     arw_deg_rt_h: float | None = Field(None, ge=0, description="angle random walk (white noise N), deg/√h")
-    bias_instability_deg_h: float = Field(0.0, ge=0, description="flicker coefficient B, deg/h; its Allan floor is 0.664·B")
+    bias_instability_deg_h: float = Field(0.0, ge=0, description="flicker coefficient B, deg/h; Allan floor 0.664·B")
     rrw_deg_h_rt_h: float = Field(0.0, ge=0, description="rate random walk K, deg/h/√h")
     bias_deg_s: float = Field(0.0, description="constant bias, deg/s")
     scale_error: float = Field(0.0, gt=-0.5, lt=0.5, description="true sensitivity over nominal, minus 1")
@@ -83,10 +84,13 @@ class TemperatureTruth(StrictModel):
 class Fault(StrictModel):
     """Something wrong with one gyro from `start` to `stop` (s; null: the end of the recording).
 
-    drift   the bias grows linearly from 0 at start to `size` deg/s at stop      step  `size` deg/s is added
-    burst   white noise of `size` deg/s per sample is added                       noise the white noise is `size` times as large
-    scale   the sensitivity changes by the ratio `size`                           stuck the count before start is repeated
-    dropout the count is 0
+    drift    the bias grows linearly from 0 at start to `size` deg/s at stop
+    step     `size` deg/s is added
+    burst    white noise of `size` deg/s a sample is added
+    noise    the white noise is `size` times as large
+    scale    the sensitivity changes by the ratio `size`
+    stuck    the count before start is repeated
+    dropout  the count is 0
     """
 
     kind: FaultKind
@@ -173,7 +177,7 @@ class TwinRecording(StrictModel):
     axis: str | None = Field(None, description="axis that turns; null: the board's only one")
     log_reference: bool = Field(False, description="true: the manifest points at the logged rate, not at its formula")
     counter_start: int = Field(0, ge=0, description="frame counter of the first frame")
-    gyros: dict[str, GyroTruth] = {}
+    gyros: dict[str, GyroTruth] = Field(default={}, description="keys that differ here, as in the twin's `gyros`")
     faults: tuple[Fault, ...] = ()
     sensor_pole_hz: float | None = Field(None, gt=0)
     temperature: TemperatureTruth | None = None
@@ -206,22 +210,23 @@ class Twin(StrictModel):
     notes: str = Field("", description="where the figures come from; goes into the manifest")
     board: str = Field(description="name of a file in config/boards")
     seed: int = Field(ge=0)
-    gyros: dict[str, GyroTruth] = Field(description="`all`, and single gyros by name: their keys go over those of `all`")
+    gyros: dict[str, GyroTruth] = Field(description="`all`, and single gyros: their keys go over those of `all`")
     correlation: Correlation = Field(0.0, description="of the white noise: one factor for every pair, or the matrix")
-    slow_correlation: Correlation | None = Field(None, description="of flicker and random walk; null: as the white noise")
+    slow_correlation: Correlation | None = Field(None, description="of flicker and random walk; null: the same")
     dcc: Dcc | None = None
-    sensor_pole_hz: float | None = Field(None, gt=0, description="-3 dB frequency of the sensor's one-pole low-pass, Hz")
+    sensor_pole_hz: float | None = Field(None, gt=0, description="-3 dB frequency of a one-pole low-pass, Hz")
     temperature: TemperatureTruth = TemperatureTruth()
     line: LineDamage = LineDamage()
     recordings: tuple[TwinRecording, ...] = Field(min_length=1)
     analysis: Analysis | None = Field(None, description="keys of config.yaml's `analysis` for the manifest")
 
     def recording(self, name: str) -> TwinRecording:
-        """The recording of that name.  raises : KeyError, listing the names there are"""
+        """The recording of that name.  raises : ConfigError, with the names there are"""
         for recording in self.recordings:
             if recording.name == name:
                 return recording
-        raise KeyError(f"twin {self.name!r} has no recording {name!r}; it has {', '.join(r.name for r in self.recordings)}")
+        known = [recording.name for recording in self.recordings]
+        raise ConfigError(f"twin {self.name!r} has no recording {name!r}{did_you_mean(name, known)}")
 
     @model_validator(mode="after")
     def _consistent(self) -> Twin:
@@ -230,14 +235,23 @@ class Twin(StrictModel):
             if names.count(name) > 1:
                 raise ValueError(f"two recordings are named {name!r}")
         for recording in self.recordings:
-            for gyro in {*self.gyros, *recording.gyros}:
-                truth_of(self, recording, gyro)
+            for gyro in dict.fromkeys([*self.gyros, *recording.gyros]):
+                _check_merged(self, recording, gyro)
         return self
 
 
 def parse_twin(text: str, source: str) -> Twin:
     """Validate the text of a twin file.  raises : InvalidFile, with every mistake at once"""
     return parse_model(text, Twin, source)
+
+
+def _check_merged(twin: Twin, recording: TwinRecording, gyro: str) -> None:
+    """Each entry may be right, and what they say together wrong."""
+    try:
+        truth_of(twin, recording, gyro)
+    except ValidationError as error:
+        reason = str(error.errors()[0]["msg"]).removeprefix("Value error, ")
+        raise ValueError(f"gyro {gyro!r} in recording {recording.name!r}: {reason}") from None
 
 
 def truth_of(twin: Twin, recording: TwinRecording, gyro: str) -> GyroTruth:
@@ -272,7 +286,9 @@ def check_against_board(twin: Twin, board: Board, source: str) -> list[Problem]:
 
     def known(gyro: str, key: str) -> None:
         if gyro not in (*names, EVERY_GYRO):
-            problems.append(Problem(source, 1, key, f"board {board.name!r} has no gyro {gyro!r}{did_you_mean(gyro, names)}"))
+            problems.append(
+                Problem(source, 1, key, f"board {board.name!r} has no gyro {gyro!r}{did_you_mean(gyro, names)}")
+            )
 
     for gyro in twin.gyros:
         known(gyro, f"gyros.{gyro}")
@@ -290,7 +306,9 @@ def check_against_board(twin: Twin, board: Board, source: str) -> list[Problem]:
                 problems.append(Problem(source, 1, f"recordings.{index}.faults.{number}", message))
         if recording.axis is not None and recording.axis not in board.axes:
             problems.append(
-                Problem(source, 1, f"recordings.{index}.axis", f"{recording.axis!r} is not one of {', '.join(board.axes)}")
+                Problem(
+                    source, 1, f"recordings.{index}.axis", f"{recording.axis!r} is not one of {', '.join(board.axes)}"
+                )
             )
         if recording.axis is None and len(board.axes) > 1 and not isinstance(recording.motion, Rest):
             message = f"says no axis for its motion; the board has {', '.join(board.axes)}"

@@ -160,6 +160,10 @@ _ALL = (
         Column("unit", "", "unit of the four figures"),
         Column("passed", "", "true if |difference| <= tolerance"),
     )),
+    Schema("reference", 1, "logged true rate of a simulated recording", (
+        _TIME,
+        Column("rate", "deg/s", "true rate about the axis that turns"),
+    )),
     Schema("truth", 1, "what a simulated recording really was", (
         _TIME,
         Column("reference", "deg/s", "true rate"),
