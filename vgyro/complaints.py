@@ -120,7 +120,9 @@ def _message_of_length(error: Any) -> str:
     short, context = error["type"] == "too_short", error["ctx"]
     limit = context["min_length" if short else "max_length"]
     items = "item" if limit == 1 else "items"
-    return f"expected at {'least' if short else 'most'} {limit} {items}, found {context['actual_length'] or 'more'}"
+    actual = context["actual_length"]
+    count = "more" if actual is None else actual
+    return f"expected at {'least' if short else 'most'} {limit} {items}, found {count}"
 
 
 def _noun(error: Any) -> str:

@@ -160,7 +160,7 @@ def check_against_board(manifest: Manifest, board: Board, source: str) -> list[P
         key = f"recordings.{index}"
         problems += [Problem(source, 1, f"{key}.{place}", text) for place, text in _axis_problems(recording, axes)]
         if recording.parquet is not None:
-            known = [*board.channels, *names]
+            known = list(dict.fromkeys([*board.channels, *names]))
             for channel in recording.parquet.columns:
                 if channel not in known:
                     message = f"board {board.name!r} has no channel {channel!r}{did_you_mean(channel, known)}"
