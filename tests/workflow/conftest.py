@@ -1,0 +1,69 @@
+"""A lab of its own for every test module: a copy of the project in an empty folder, with a small simulated data set."""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+COPIED = ("Snakefile", "workflow", "profiles", "config", "vgyro")
+
+
+@dataclass(frozen=True)
+class Lab:
+    """A folder in which `snakemake` can run as a user would run it."""
+
+    folder: Path
+
+    def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run `snakemake`; stdout and stderr together, as on a terminal."""
+        return self._command(["snakemake", *arguments])
+
+    def vgyro(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run `vgyro`."""
+        return self._command(["vgyro", *arguments])
+
+    def _command(self, command: list[str]) -> subprocess.CompletedProcess[str]:
+        programs = str(Path(sys.executable).parent)
+        environment = {
+            **os.environ,
+            "PATH": programs + os.pathsep + os.environ["PATH"],
+            "PYTHONPATH": str(self.folder),
+            "XDG_CACHE_HOME": str(self.folder / ".cache"),
+        }
+        return subprocess.run(
+            command, cwd=self.folder, env=environment, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+        )  # fmt: skip
+
+    def products(self) -> dict[str, str]:
+        """SHA-256 of every artefact and page, by path; logs and benchmark times are not products."""
+        files = [path for top in ("results", "reports") for path in (self.folder / top).rglob("*") if path.is_file()]
+        kept = [path for path in files if not {"logs", "benchmarks"} & set(path.relative_to(self.folder).parts)]
+        return {str(path.relative_to(self.folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in kept}
+
+
+def make_lab(folder: Path, root: Path) -> Lab:
+    """Copy the project and simulate the small data set."""
+    for name in COPIED:
+        source = root / name
+        if source.is_dir():
+            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(source, folder / name)
+    shutil.copy(HERE / "tiny.yaml", folder / "config" / "twins" / "tiny.yaml")
+    lab = Lab(folder)
+    made = lab.vgyro("simulate", "tiny", "--out", "raw/tiny")
+    assert made.returncode == 0, made.stdout
+    return lab
+
+
+@pytest.fixture(scope="module")
+def lab(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    """A lab with the small data set in raw/tiny."""
+    return make_lab(tmp_path_factory.mktemp("lab"), root)

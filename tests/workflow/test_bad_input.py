@@ -1,0 +1,77 @@
+"""One clear message for each bad input, exit code not 0, and every other data set reported all the same."""
+
+import gzip
+import shutil
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.workflow, pytest.mark.timeout(1200)]
+
+MANIFEST = "board: {board}\nrecordings:\n  - name: static\n    kind: static\n    files: [{file}]\n"
+
+
+def dataset(lab, name: str, file: str, content: bytes, board: str = "dsp6") -> Path:
+    folder = lab.folder / "raw" / name
+    folder.mkdir(parents=True)
+    (folder / file).write_bytes(content)
+    (folder / "dataset.yaml").write_text(MANIFEST.format(board=board, file=file), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def output(lab) -> str:
+    dump = next((lab.folder / "raw/tiny").glob("static*.bin")).read_bytes()
+    dataset(lab, "empty", "empty.bin", b"")
+    dataset(lab, "other", "other.bin", dump, board="mimu4444")
+    dataset(lab, "cut", "cut.bin.gz", gzip.compress(dump)[: len(dump) // 4])
+    (lab.folder / "raw/missing").mkdir()
+    (lab.folder / "raw/missing/dataset.yaml").write_text(MANIFEST.format(board="dsp6", file="gone.bin"))
+    wrong = lab.folder / "raw/wrong"
+    wrong.mkdir()
+    (wrong / "dataset.yaml").write_text(
+        "board: dsp7\ntitel: three mistakes\nrecordings:\n  - name: a\n    kind: statik\n    files: [a.bin]\n"
+    )
+    done = lab.run("--cores", "2")
+    assert done.returncode != 0
+    return done.stdout
+
+
+def test_the_good_data_set_is_reported(lab, output: str) -> None:
+    assert (lab.folder / "reports/tiny.html").is_file(), output
+    assert (lab.folder / "reports/index.html").is_file(), output
+
+
+@pytest.mark.parametrize("name", ["empty", "other", "missing"])
+def test_a_refused_recording_still_has_its_page(lab, output: str, name: str) -> None:
+    assert (lab.folder / f"reports/{name}.html").is_file(), output
+
+
+def test_messages_say_what_where_and_what_to_do(output: str) -> None:
+    lines = output.splitlines()
+    assert any("empty.bin" in line and "empty" in line for line in lines)
+    assert any("other.bin" in line and "dsp6" in line for line in lines), "the board that does fit is named"
+    assert any("gone.bin" in line for line in lines)
+    assert any("cut.bin.gz" in line for line in lines)
+
+
+def test_a_manifest_with_three_mistakes_names_all_three(output: str) -> None:
+    assert "raw/wrong/dataset.yaml:2: titel:" in output
+    assert "did you mean 'title'?" in output
+    assert "raw/wrong/dataset.yaml:5: recordings.0.kind:" in output
+    assert "dsp7" in output
+
+
+def test_no_traceback_on_the_terminal(output: str) -> None:
+    assert "Traceback" not in output
+
+
+def test_a_wrong_config_stops_everything(lab, output: str) -> None:
+    path = lab.folder / "config/config.yaml"
+    kept = path.read_text(encoding="utf-8")
+    path.write_text("analysis: {volatility: {widow: 3}}\n", encoding="utf-8")
+    done = lab.run("--cores", "2")
+    path.write_text(kept, encoding="utf-8")
+    assert done.returncode != 0
+    assert "config/config.yaml:1: analysis.volatility.widow: unknown key; did you mean 'window'?" in done.stdout
+    shutil.rmtree(lab.folder / "raw/wrong")

@@ -1,0 +1,60 @@
+"""Same inputs, same bytes; nothing to do the second time; an edit re-runs what it must, and no more."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.workflow, pytest.mark.timeout(1200)]
+
+
+def jobs_planned(output: str) -> set[str]:
+    """Rules in the job table of a dry run."""
+    table = output[output.index("Job stats:") :]
+    return {match.group(1) for match in re.finditer(r"^(\w+) +\d+$", table, flags=re.MULTILINE)} - {"total", "all"}
+
+
+def test_second_run_one_core_and_edits(lab) -> None:
+    first = lab.run("--cores", "2")
+    assert first.returncode == 0, first.stdout
+    assert (lab.folder / "reports/tiny.html").is_file()
+    assert (lab.folder / "reports/index.html").is_file()
+    products = lab.products()
+    assert any(name.endswith("fused.parquet") for name in products)
+
+    second = lab.run("--cores", "2")
+    assert second.returncode == 0, second.stdout
+    assert "Nothing to be done" in second.stdout
+
+    config = lab.folder / "config/config.yaml"
+    config.write_text("# a remark\n" + config.read_text(encoding="utf-8"), encoding="utf-8")
+    assert "Nothing to be done" in lab.run("--cores", "2", "--dry-run").stdout
+
+    source = lab.folder / "vgyro/metrics/allan.py"
+    source.write_text(source.read_text(encoding="utf-8") + "\n# edited\n", encoding="utf-8")
+    planned = jobs_planned(lab.run("--cores", "2", "--dry-run").stdout)
+    assert {"measure", "report"} <= planned
+    assert not planned & {"decode", "calibrate", "convert", "garch", "dcc", "weights"}
+    source.write_text(source.read_text(encoding="utf-8").removesuffix("\n# edited\n"), encoding="utf-8")
+
+    shutil.rmtree(lab.folder / "results")
+    shutil.rmtree(lab.folder / "reports")
+    shutil.rmtree(lab.folder / ".snakemake")
+    again = lab.run("--cores", "1")
+    assert again.returncode == 0, again.stdout
+    assert lab.products() == products
+
+
+def test_progress_is_shown_and_units_are_inside(lab) -> None:
+    import json
+
+    import pyarrow.parquet as pq
+
+    rates: list[Path] = sorted((lab.folder / "results/tiny").rglob("rates.parquet"))
+    assert rates
+    for path in rates:
+        record = json.loads(pq.read_schema(path).metadata[b"vgyro"])
+        assert record["units"]["gyro1"] == "deg/s"
+        assert set(record["provenance"]) == {"inputs", "options", "code"}
+        assert re.fullmatch(r"[0-9a-f]{64}", record["provenance"]["code"])
