@@ -82,7 +82,9 @@ def test_keys_that_clash_only_after_merging_are_named():
 
 
 def test_a_step_longer_than_the_window_is_refused():
-    with pytest.raises(InvalidFile, match="config.yaml:2: analysis.volatility: step = 400 is longer than window = 360"):
+    with pytest.raises(
+        InvalidFile, match=r"config\.yaml:2: analysis\.volatility: step = 400 is longer than window = 360"
+    ):
         parse_config("analysis:\n  volatility: {step: 400}\n")
 
 

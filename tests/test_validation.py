@@ -61,7 +61,8 @@ def test_missing_keys_are_named_at_the_line_of_what_lacks_them():
         ("rest: [[0, 10], [20]]", "rest.1: item 2 is missing"),
         ("rest: [[0, 10], [20, soon]]", "rest.1.1: expected a number, found 'soon'"),
         ("rest: [[0, 10, 20]]", "rest.0: expected at most 2 items, found 3"),
-        ("parquet: {values: count}", "parquet.values: expected one of counts, rates; found 'count'; did you mean 'counts'?"),
+        ("parquet: {values: count}",
+         "parquet.values: expected one of counts, rates; found 'count'; did you mean 'counts'?"),
         ("parquet: {columns: {g1: 1}}", "parquet.columns.g1: expected text, found 1; put it in quotes"),
         ("parquet: log", "parquet: expected keys and values, found 'log'"),
         ("parquet: {colums: {}}", "parquet.colums: unknown key; did you mean 'columns'?"),
@@ -75,7 +76,8 @@ def test_one_mistake_makes_one_message(line, expected):
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
-        ("{kind: sinus}", "kind: expected one of plateaus, constant, sinusoid, file; found 'sinus'; did you mean 'sinusoid'?"),
+        ("{kind: sinus}",
+         "kind: expected one of plateaus, constant, sinusoid, file; found 'sinus'; did you mean 'sinusoid'?"),
         ("{kid: constant}", "kind: missing; this key is required"),
         ("{kind: constant}", "rate: missing; this key is required"),
         ("{kind: plateaus}", "plateaus: missing; this key is required"),
@@ -99,8 +101,10 @@ def test_the_branch_of_a_union_is_not_part_of_the_key(line, expected):
 
 
 def test_whole_numbers_bounds_and_nothing():
-    text = "board: b\nrecordings:\n- {name: a, kind: free, files: f}\nanalysis:\n  volatility:\n    window: 10\n    step:\n"
-    text += "    arch_lags: 1.5\n    definitions: [levl]\n    rate_hz: fast\n  fusion:\n    methods: [1, dcc]\n"
+    text = "board: b\nrecordings:\n- {name: a, kind: free, files: f}\nanalysis:\n  volatility:\n    window: 10\n"
+    text += (
+        "    step:\n    arch_lags: 1.5\n    definitions: [levl]\n    rate_hz: fast\n  fusion:\n    methods: [1, dcc]\n"
+    )
     choice = "expected one of level, demeaned, difference, residual; found 'levl'; did you mean 'level'?"
     assert mistakes(text) == [
         "6: analysis.volatility.window: expected a number of at least 50, found 10",
