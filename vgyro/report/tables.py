@@ -8,8 +8,8 @@ from typing import Literal
 
 from markupsafe import Markup
 
-from vgyro.report.numbers import MISSING, with_interval
 from vgyro.report.html import macro
+from vgyro.report.numbers import MISSING, with_interval
 
 Tone = Literal["", "good", "bad", "warn", "muted", "best"]
 

@@ -1,0 +1,225 @@
+"""Interactive plots: curves with intervals, marked stretches, on linear or logarithmic axes.
+
+A plot is Bokeh's JSON inside the page; it is drawn when it comes into sight. Model ids are numbered by the plot's own
+name, so that a page is the same from run to run.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from markupsafe import Markup
+
+from vgyro.report.colours import ACCENT, GRID, INK, MUTED, PAPER, marks, series_dash, series_mark
+from vgyro.report.html import macro
+
+if TYPE_CHECKING:
+    from bokeh.plotting import figure as Figure
+
+Scale = Literal["linear", "log"]
+SVG_DASHES = {"solid": "", "dashed": "6 3", "dotted": "2 3", "dotdash": "2 3 6 3"}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One series of a plot.
+
+    name  : unique in the plot;  label : what the legend says;  x, y : arrays [T]; NaN breaks the line
+    low, high : interval at each point, drawn as a thin bar;  colour : number in the palette, dashes follow from it
+    width : px;  points : also draw a mark at each point;  visible : shown from the start;  group : heading in the legend
+    line : whether the points are joined
+    """
+
+    name: str
+    label: str
+    x: np.ndarray
+    y: np.ndarray
+    low: np.ndarray | None = None
+    high: np.ndarray | None = None
+    colour: int = 0
+    ink: bool = False
+    width: float = 1.5
+    points: bool = False
+    line: bool = True
+    visible: bool = True
+    group: str = ""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis: what it shows with its unit, and its scale."""
+
+    label: str
+    scale: Scale = "linear"
+
+
+def curve_plot(
+    identifier: str,
+    title: str,
+    curves: Sequence[Curve],
+    x: Axis,
+    y: Axis,
+    *,
+    summary: str = "",
+    spans: Sequence[tuple[float, float]] = (),
+    levels: Sequence[float] = (),
+    height: int = 300,
+) -> Markup:
+    """A plot of curves, with a legend whose entries show and hide them.
+
+    identifier : anchor, unique in the page;  spans : stretches [start, stop] of x with a tinted ground
+    levels     : horizontal lines;  height : px;  the width is that of the page
+    """
+    plot = _empty(x, y, height)
+    _mark_spans(plot, spans)
+    _mark_levels(plot, levels)
+    sources = _sources(curves)
+    lines = [_draw(plot, curve, source) for curve, source in zip(curves, sources, strict=True)]
+    _add_hover(plot, [line for line in lines if line is not None], x, y)
+    item = {"json": _escaped(_as_json(plot, identifier)), "height": height}
+    legend = _legend(curves) if len(curves) > 1 else ()
+    return macro("plot", identifier=identifier, title=title, summary=summary, item=item, legend=legend)
+
+
+def _empty(x: Axis, y: Axis, height: int) -> Figure:
+    from bokeh.plotting import figure
+
+    plot = figure(
+        height=height, sizing_mode="stretch_width", x_axis_type=x.scale, y_axis_type=y.scale, x_axis_label=x.label,
+        y_axis_label=y.label, tools="pan,box_zoom,wheel_zoom,reset,save", active_drag="box_zoom", output_backend="canvas",
+        background_fill_color=None, border_fill_color=None, outline_line_color=GRID, min_border_right=12,
+    )  # fmt: skip
+    plot.toolbar.logo = None
+    plot.toolbar.autohide = True
+    for ranged in (plot.x_range, plot.y_range):
+        ranged.only_visible = True
+    for axis in plot.axis:
+        axis.axis_label_text_font_style = "normal"
+        axis.axis_label_text_font_size = "12px"
+        axis.major_label_text_font_size = "11px"
+        axis.axis_label_text_color = axis.major_label_text_color = MUTED
+        axis.axis_line_color = axis.major_tick_line_color = MUTED
+        axis.minor_tick_line_color = None
+    for grid in plot.grid:
+        grid.grid_line_color = GRID
+    return plot
+
+
+def _mark_spans(plot: Figure, spans: Sequence[tuple[float, float]]) -> None:
+    from bokeh.models import BoxAnnotation
+
+    for start, stop in spans:
+        plot.add_layout(BoxAnnotation(left=start, right=stop, fill_color=ACCENT, fill_alpha=0.08, level="underlay"))
+
+
+def _mark_levels(plot: Figure, levels: Sequence[float]) -> None:
+    from bokeh.models import Span
+
+    for level in levels:
+        plot.add_layout(Span(location=level, dimension="width", line_color=MUTED, line_dash="dashed"))
+
+
+def _sources(curves: Sequence[Curve]) -> list[Any]:
+    """Data sources; curves over the same x array share one, so that x is stored once."""
+    from bokeh.models import ColumnDataSource
+
+    groups: dict[int, dict[str, np.ndarray]] = {}
+    for curve in curves:
+        data = groups.setdefault(id(curve.x), {"x": _single(curve.x)})
+        data[curve.name] = _single(curve.y)
+        if curve.low is not None and curve.high is not None:
+            data[f"{curve.name} low"], data[f"{curve.name} high"] = _single(curve.low), _single(curve.high)
+    made = {key: ColumnDataSource(data) for key, data in groups.items()}
+    return [made[id(curve.x)] for curve in curves]
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    """Seven digits are more than a screen shows, at half the bytes."""
+    return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def _draw(plot: Figure, curve: Curve, source: Any) -> Any:
+    colour = INK if curve.ink else series_mark(curve.colour)
+    common = {"source": source, "name": curve.name, "visible": curve.visible}
+    if curve.low is not None and curve.high is not None:
+        plot.segment(
+            x0="x", x1="x", y0=f"{curve.name} low", y1=f"{curve.name} high", line_color=colour, line_width=1,
+            line_alpha=0.6, **common,
+        )  # fmt: skip
+    drawn = None
+    if curve.line:
+        drawn = plot.line(
+            "x", curve.name, line_color=colour, line_width=curve.width, line_dash=series_dash(curve.colour), **common
+        )
+    if curve.points:
+        marks_drawn = plot.scatter("x", curve.name, size=4, line_color=colour, fill_color=PAPER, **common)
+        drawn = drawn or marks_drawn
+    return drawn
+
+
+def _add_hover(plot: Figure, renderers: list[Any], x: Axis, y: Axis) -> None:
+    from bokeh.models import HoverTool
+
+    tooltips = [("", "$name"), (x.label, "@x{%.5g}"), (y.label, "@$name{%.4g}")]
+    plot.add_tools(
+        HoverTool(renderers=renderers, tooltips=tooltips, formatters={"@x": "printf", "@$name": "printf"}, mode="mouse")
+    )
+
+
+def _as_json(plot: Figure, identifier: str) -> str:
+    """Bokeh's JSON of a plot, with ids that depend on the plot's name alone."""
+    from bokeh.embed import json_item
+
+    record = json_item(plot, f"{identifier}-canvas")
+    record["doc"]["title"] = identifier
+    names: dict[str, str] = {}
+    _collect_ids(record["doc"], names, identifier)
+    return json.dumps(_renamed(record, names), separators=(",", ":"), ensure_ascii=False)
+
+
+def _collect_ids(node: Any, names: dict[str, str], prefix: str) -> None:
+    if isinstance(node, dict):
+        if isinstance(node.get("id"), str):
+            names.setdefault(node["id"], f"{prefix}.{len(names)}")
+        for value in node.values():
+            _collect_ids(value, names, prefix)
+    elif isinstance(node, list):
+        for value in node:
+            _collect_ids(value, names, prefix)
+
+
+def _renamed(node: Any, names: dict[str, str]) -> Any:
+    if isinstance(node, dict):
+        return {
+            key: names[value] if key in {"id", "root_id"} and value in names else _renamed(value, names)
+            for key, value in node.items()
+        }
+    if isinstance(node, list):
+        return [_renamed(value, names) for value in node]
+    return node
+
+
+def _escaped(text: str) -> Markup:
+    """JSON that cannot end its script element."""
+    return Markup(text.replace("<", "\\u003c"))
+
+
+def _legend(curves: Sequence[Curve]) -> tuple[tuple[str, tuple[dict[str, Any], ...]], ...]:
+    """Entries of the legend, group by group."""
+    variables = marks()
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for curve in curves:
+        entry = {
+            "name": curve.name,
+            "label": curve.label,
+            "visible": curve.visible,
+            "variable": "ink" if curve.ink else variables[series_mark(curve.colour)],
+            "width": curve.width,
+            "dashes": SVG_DASHES[series_dash(curve.colour)],
+        }
+        groups.setdefault(curve.group, []).append(entry)
+    return tuple((group, tuple(entries)) for group, entries in groups.items())
