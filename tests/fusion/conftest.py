@@ -1,0 +1,27 @@
+"""Arrays of simulated gyros for the fusion tests."""
+
+import numpy as np
+import pytest
+
+from vgyro.fusion import ArrayNoise, ArrayRates
+
+ARW = 6.17 / 60.0
+
+
+@pytest.fixture
+def make_array():
+    """White gyros: make_array(samples, arw [N], rate_hz, truth, correlation, segment)."""
+
+    def make(
+        samples, arw, rate_hz=200.0, truth=0.0, correlation=None, segment=None, at_rest=True, seed=1, weights=None
+    ):
+        arw = np.asarray(arw, dtype=float)
+        correlation = np.eye(len(arw)) if correlation is None else np.asarray(correlation, dtype=float)
+        rng = np.random.default_rng(seed)
+        white = rng.standard_normal((samples, len(arw))) @ np.linalg.cholesky(correlation).T
+        rate = np.asarray(truth)[..., None] + white * arw * np.sqrt(rate_hz)
+        segment = np.zeros(samples, dtype=np.int32) if segment is None else segment
+        noise = ArrayNoise(arw, np.full(len(arw), 0.001), correlation)
+        return ArrayRates(rate, rate_hz, segment, np.full(samples, at_rest), noise, weights or {})
+
+    return make
