@@ -1,0 +1,101 @@
+"""Plateaus of a rate table: found in a logged reference, and averaged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+BATCHES = 20
+FEWEST_BATCHES = 4
+
+
+@dataclass(frozen=True)
+class PlateauMeans:
+    """rate [P] deg/s; mean, standard_error [P, N] counts (NaN where clipped or empty); samples [P]"""
+
+    rate: np.ndarray
+    mean: np.ndarray
+    standard_error: np.ndarray
+    samples: np.ndarray
+
+
+def find_plateaus(
+    reference: np.ndarray,
+    time: np.ndarray,
+    min_duration_s: float = 3.0,
+    settle_s: float = 1.0,
+    tolerance: float | None = None,
+) -> list[tuple[float, float, float]]:
+    """Stretches of constant rate in a logged reference, as (start s, stop s, rate deg/s).
+
+    reference : array [T], deg/s;  time : array [T], s, ascending
+    settle_s  : cut from the start of each stretch, and half of it from the end
+    tolerance : deg/s; two successive second-long means of a plateau differ by less. None: a thousandth of the span of
+                the reference, or six times its own noise, whichever is larger
+    returns   : stretches of at least min_duration_s after the cuts, in order of time
+    """
+    reference, time = np.asarray(reference, dtype=float), np.asarray(time, dtype=float)
+    keep = np.isfinite(reference) & np.isfinite(time)
+    reference, time = reference[keep], time[keep]
+    if time.size < 2:
+        return []
+    step = max(float(np.median(np.diff(time))), 1e-9)
+    width = max(round(min(0.5, min_duration_s / 6) / step), 1)
+    if tolerance is None:
+        noise = float(np.median(np.abs(np.diff(reference)))) * 1.4826 / np.sqrt(2)
+        tolerance = max(1e-3 * float(np.ptp(reference)), 6 * noise / np.sqrt(width), 1e-9)
+    blocks = time.size // width
+    level = reference[: blocks * width].reshape(blocks, width).mean(axis=1)
+    swing = np.ptp(reference[: blocks * width].reshape(blocks, width), axis=1)
+    calm = swing <= max(tolerance, 8 * np.median(swing))
+    plateaus, first = [], 0
+    for block in range(1, blocks + 1):
+        together = (
+            block < blocks
+            and calm[block]
+            and calm[first]
+            and abs(level[block] - np.median(level[first:block])) <= tolerance
+        )
+        if together:
+            continue
+        start, stop = time[first * width] + settle_s, time[block * width - 1] - settle_s / 2
+        if calm[first] and stop - start >= min_duration_s:
+            inside = (time >= start) & (time <= stop)
+            plateaus.append((float(start), float(stop), float(np.mean(reference[inside]))))
+        first = block
+    return plateaus
+
+
+def average_plateaus(
+    counts: np.ndarray,
+    time: np.ndarray,
+    plateaus: list[tuple[float, float, float]],
+    rails: tuple[float, float] | None = None,
+) -> PlateauMeans:
+    """Mean count of every gyro on every plateau, and its standard error by batch means.
+
+    counts   : array [T, N];  time : array [T], s
+    plateaus : (start, stop, rate) each, the settling already left out
+    rails    : counts at which the converter clips; a plateau with a clipped sample is NaN for that gyro
+    returns  : PlateauMeans. Standard error: the plateau is cut into 20 batches (fewer where it is short) and the spread
+               of their means is taken, so that slow noise counts.
+    """
+    number = counts.shape[1]
+    shape = (len(plateaus), number)
+    mean, error, samples = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(len(plateaus), dtype=np.int64)
+    for row, (start, stop, _) in enumerate(plateaus):
+        first, last = np.searchsorted(time, start, side="left"), np.searchsorted(time, stop, side="right")
+        part = np.asarray(counts[first:last], dtype=float)
+        samples[row] = len(part)
+        if len(part) < FEWEST_BATCHES:
+            continue
+        mean[row] = part.mean(axis=0)
+        length = max(len(part) // BATCHES, 1)
+        batches = len(part) // length
+        means = part[: batches * length].reshape(batches, length, number).mean(axis=1)
+        error[row] = means.std(axis=0, ddof=1) / np.sqrt(batches)
+        if rails is not None:
+            clipped = (part <= rails[0]).any(axis=0) | (part >= rails[1]).any(axis=0)
+            mean[row, clipped] = error[row, clipped] = np.nan
+    return PlateauMeans(np.array([rate for _, _, rate in plateaus]), mean, error, samples)

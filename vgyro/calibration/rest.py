@@ -1,0 +1,87 @@
+"""Where does the board stand still? Found from the gyros themselves."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from vgyro.config import RestOptions
+
+STEPS_PER_WINDOW = 4
+QUIET_QUANTILE = 0.1
+MOVING_SHARE = 4  # motion about one axis of three moves a third of the gyros: a quarter of them must see it
+SMOOTH = 3.0  # a spread so many times that of adjacent samples is motion, not noise
+FEWEST_SAMPLES = 4
+
+
+def find_rest(
+    rates: np.ndarray, rate_hz: float, options: RestOptions | None = None, segment: np.ndarray | None = None
+) -> np.ndarray:
+    """True where the board stands still.
+
+    rates   : array [T, N], deg/s or counts, all gyros of the board, every axis; a gyro that never changes is left out
+    options : window_s, min_duration_s, guard_s, threshold
+    segment : array [T] int; no window and no stretch goes across a gap
+    returns : bool [T]
+    Windows of window_s, a quarter of it apart. A window moves if, for at least a quarter of the gyros, its standard
+    deviation exceeds threshold times the gyro's quiet level (the lowest tenth of all windows), or its mean is that far
+    from the gyro's level in the quiet windows (a steady turn). Stretches covered by windows at rest are cut by guard_s
+    at both ends, and kept if they last min_duration_s. If even the quietest windows vary much more than adjacent
+    samples do, the board never rests. A turn slower than threshold times the noise of one sample, begun and ended that
+    slowly, is not seen.
+    """
+    options = options or RestOptions()
+    rates = np.asarray(rates)
+    samples = len(rates)
+    length = max(round(options.window_s * rate_hz), FEWEST_SAMPLES)
+    step = max(length // STEPS_PER_WINDOW, 1)
+    borders = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), samples] if segment is not None else [0, samples]
+    parts = [np.arange(a, b - length + 1, step) for a, b in itertools.pairwise(borders) if b - a >= length]
+    if not parts:
+        return np.zeros(samples, dtype=bool)
+    starts = np.concatenate(parts)
+    scores = [
+        score for column in range(rates.shape[1]) if (score := _scores(rates[:, column], starts, length)) is not None
+    ]
+    if not scores:
+        return np.zeros(samples, dtype=bool)
+    needed = math.ceil(len(scores) / MOVING_SHARE)
+    score = np.sort(np.stack(scores), axis=0)[-needed]
+    covered = np.zeros(samples + 1, dtype=np.int64)
+    resting = starts[score < options.threshold]
+    np.add.at(covered, resting, 1)
+    np.add.at(covered, resting + length, -1)
+    still = np.cumsum(covered)[:-1] > 0
+    return _long_stretches(still, borders, round(options.guard_s * rate_hz), round(options.min_duration_s * rate_hz))
+
+
+def _scores(rate: np.ndarray, starts: np.ndarray, length: int) -> np.ndarray | None:
+    """How far each window is from rest, in quiet levels; None for a gyro that never changes."""
+    centred = rate.astype(float) - float(np.median(rate))
+    sums, squares = (np.concatenate(([0.0], np.cumsum(values))) for values in (centred, centred**2))
+    steps = np.concatenate(([0.0, 0.0], np.cumsum(np.diff(centred) ** 2)))
+    mean = (sums[starts + length] - sums[starts]) / length
+    spread = np.sqrt(np.maximum((squares[starts + length] - squares[starts]) / length - mean**2, 0))
+    roughness = np.sqrt(np.maximum(steps[starts + length] - steps[starts + 1], 0) / (2 * (length - 1)))
+    if not spread.any():
+        return None
+    quiet = float(np.quantile(spread[spread > 0], QUIET_QUANTILE))
+    if quiet > SMOOTH * float(np.quantile(roughness[spread > 0], QUIET_QUANTILE)):
+        return np.full(len(starts), np.inf)
+    calm = spread <= 2 * quiet
+    level = float(np.median(mean[calm]))
+    return np.maximum(spread, np.abs(mean - level)) / quiet
+
+
+def _long_stretches(still: np.ndarray, borders: list[int], guard: int, shortest: int) -> np.ndarray:
+    edge = np.diff(still.astype(np.int8), prepend=0)
+    change = edge != 0
+    change[[border for border in borders if border < len(still)]] = True
+    points = [*np.flatnonzero(change).tolist(), len(still)]
+    kept = np.zeros(len(still), dtype=bool)
+    for start, stop in itertools.pairwise(points):
+        if still[start] and stop - start - 2 * guard >= max(shortest, 1):
+            kept[start + guard : stop - guard] = True
+    return kept
