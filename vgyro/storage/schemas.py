@@ -32,7 +32,7 @@ class Schema:
 _TIME = Column("time", "s", "since the first frame of the recording")
 _SEGMENT = Column("segment", "", "number of the gap-free stretch, from 0")
 _WINDOW = (
-    Column("window", "", "number of the window, from 0"),
+    Column("window", "", "number from 0; -1: the longest stretch without a gap, often the whole record"),
     Column("start", "", "first sample of the window in the volatility series"),
     Column("stop", "", "one past the last sample"),
     Column("time_start", "s", "time of the first sample"),
@@ -62,7 +62,7 @@ _ALL = (
         Column("kurtosis", "1", "kurtosis, 3 for a Gaussian"),
         Column("status", "", "ok, too short, no variance"),
     )),
-    Schema("garch", 1, "GARCH(1,1) of each gyro in each window", (
+    Schema("garch", 1, "GARCH(1,1) of each gyro in each window and in the longest stretch (window = -1)", (
         *_WINDOW,
         Column("gyro", "", "gyro"),
         Column("omega", "(deg/s)²", "constant α0"),
@@ -74,7 +74,7 @@ _ALL = (
         Column("log_likelihood", "1", "Gaussian log-likelihood of the window"),
         Column("status", "", "converged, boundary, no variance, too short, failed"),
     )),
-    Schema("dcc", 1, "DCC(1,1) and constant-correlation test of each window, and of the whole record (window = -1)", (
+    Schema("dcc", 1, "DCC(1,1) and constant-correlation test of each window and the longest stretch (-1)", (
         *_WINDOW,
         Column("a", "1", "weight of the last outer product"),
         Column("b", "1", "weight of the last Q"),
@@ -84,11 +84,11 @@ _ALL = (
         Column("se_b_hessian", "1", "inverse-Hessian standard error, which is too small"),
         Column("log_likelihood", "1", "correlation part of the log-likelihood, DCC"),
         Column("log_likelihood_ccc", "1", "the same with a = b = 0"),
-        Column("target", "1", "rows of S above the diagonal, as a list"),
+        Column("target", "1", "rows of S above the diagonal, as a list; NaN for a gyro without variance"),
         Column("statistic", "1", "constant-correlation test"),
         Column("p_value", "1", "its probability under chi²(s + 1)"),
         Column("p_value_s", "1", "its probability under chi²(s)"),
-        Column("status", "", "converged, boundary, not positive definite, one gyro, failed"),
+        Column("status", "", "converged; boundary (margin), not positive definite, one gyro, too short, failed"),
     )),
     Schema("weights", 1, "weights of one model and mode, one row a sample of the volatility series", (
         _TIME, _SEGMENT,
@@ -97,7 +97,7 @@ _ALL = (
         Column("sigma", "deg/s", "conditional standard deviation of the fused rate, √(w'Hw)"),
         Column("w_{gyro}", "1", "weight of the gyro"),
         Column("sd_{gyro}", "deg/s", "conditional standard deviation of the gyro, √h"),
-        Column("status", "", "ok, or why the weights are equal"),
+        Column("status", "", "ok, or what was left out, or why the weights are equal"),
     )),
     Schema("fused", 1, "one column a method", (
         _TIME, _SEGMENT,

@@ -64,10 +64,11 @@ def constant_correlation_test(z: np.ndarray, lags: int = 1) -> Test:
     returns : Test; NaN for one gyro, a singular correlation, or fewer than lags + 3 samples
 
     z is whitened by the symmetric root of the sample correlation; the products above the diagonal of z_t z_t', all
-    pairs stacked, are regressed on a constant and s of their own lags; δ'X'Xδ/σ̂², σ̂² = mean squared residual, is chi²(s + 1)
-    in the paper. Whitening by the SAMPLE correlation forces the constant to zero, so at T = 360, s = 1 a nominal 5 %
-    test rejects 1.8 % under chi²(s + 1) and 5.5 % under chi²(s): both p-values are returned. Its power against
-    (a, b) = (.03, .95) at T = 360 is about 40 %.
+    pairs stacked, are regressed on a constant and s of their own lags; δ'X'Xδ/σ̂² with σ̂² the mean squared residual is
+    chi²(s + 1) in the paper. Whitening by the SAMPLE correlation forces the constant to zero, so at T = 360, s = 1 a
+    nominal 5 % test rejects 1.8 % under chi²(s + 1) and 5.5 % under chi²(s): both p-values are returned. Its power
+    against (a, b) = (.03, .95) at T = 360 is about 40 %.
+    pymgarch.dcc_test gives the same statistic and the first p-value only; it raises for one series.
     Engle & Sheppard (2001), NBER 8554, section 3.3; Liu et al. (2015), eq. 14.
     """
     from scipy.special import chdtrc

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.config import CorrelationModel, Definition, Mode
+from vgyro.engine.models import NOT_POSITIVE_DEFINITE
 from vgyro.engine.recursions import dcc_correlation, garch_variance
 from vgyro.volatility.series import window_residuals
 from vgyro.volatility.stretches import Window, stretches
@@ -87,7 +88,7 @@ def rolling_weights(
 
     values  : [M, N] deg/s;  segment : [M]
     models  : the windows of each segment in order, `step` apart
-    weigh   : H [T, n, n] -> w [T, n], the minimum-variance weights
+    weigh   : H [T, n, n] -> w [T, n], the minimum-variance weights; NaN where H_t cannot be used
     span    : of the definition `residual`
     too_short : status of the samples of a segment that holds no window; their weights are equal
 
@@ -141,6 +142,8 @@ def _fill(
     covariance, gyros = conditional_covariance(r, model.window.length, model, correlation)
     covariance = covariance[begin - start : end - start]
     weights = weigh(covariance) if covariance.shape[1] > 1 else np.ones((end - begin, 1))
+    lost = np.asarray(np.isnan(weights).any(axis=1))
+    weights = np.where(lost[:, None], 1 / weights.shape[1], weights)
     whole = np.zeros((end - begin, len(gyros)))
     whole[:, gyros] = weights
     deviation = np.full_like(whole, np.nan)
@@ -148,4 +151,4 @@ def _fill(
     result.weights[begin:end] = whole
     result.deviation[begin:end] = deviation
     result.sigma[begin:end] = np.sqrt(np.einsum("ti,tij,tj->t", weights, covariance, weights))
-    result.status[begin:end] = model.note or OK
+    result.status[begin:end] = np.where(lost, NOT_POSITIVE_DEFINITE, model.note or OK)
