@@ -9,7 +9,9 @@ from vgyro.config import override_analysis
 from vgyro.dataset import AT_REST
 from vgyro.storage.inputs import data_files
 from vgyro.tasks.closure import code_hash
-from vgyro.tasks.inputs_check import load_datasets, load_twins
+from vgyro.tasks.inputs_check import load_datasets
+from vgyro.tasks.inputs_check import reference_file as logged_reference
+from vgyro.tasks.twins import load_twins
 
 PAPERS = ("jiang2012", "liu2015")
 RUN = "python -m vgyro.tasks."
@@ -21,6 +23,8 @@ LOADED = load_datasets("config/config.yaml", "raw", "config/boards")
 TWINS = load_twins(PAPERS, "config/twins", "results/twins", "config/boards")
 DATASETS = {**LOADED.datasets, **TWINS}
 PROBLEMS = [str(problem) for problem in LOADED.problems]
+if not LOADED.config_ok:
+    sys.exit("\n".join(f"vgyro: {problem}" for problem in PROBLEMS))
 for _problem in PROBLEMS:
     print(f"vgyro: {_problem}", file=sys.stderr)
 
@@ -32,7 +36,9 @@ def code(task):
 
 def analysis_of(dataset):
     """The analysis options of a data set: config.yaml with the manifest's overrides."""
-    return override_analysis(LOADED.config.analysis, DATASETS[dataset].manifest.analysis)
+    return override_analysis(
+        LOADED.config.analysis, DATASETS[dataset].manifest.analysis
+    )
 
 
 def stage(*sections, **values):
@@ -47,7 +53,9 @@ def stage(*sections, **values):
             if section in ("manifest", "board"):
                 record[section] = getattr(known, section).model_dump(mode="json")
             else:
-                record["analysis"][section] = analysis_of(wildcards.dataset).model_dump(mode="json")[section]
+                record["analysis"][section] = analysis_of(wildcards.dataset).model_dump(
+                    mode="json"
+                )[section]
         return json.dumps(record, sort_keys=True)
 
     return options
@@ -55,7 +63,12 @@ def stage(*sections, **values):
 
 def files_of(dataset, recording):
     """All files that the manifest names for a recording, there or not."""
-    return [str(path) for path in data_files(DATASETS[dataset].manifest, recording, DATASETS[dataset].folder)]
+    return [
+        str(path)
+        for path in data_files(
+            DATASETS[dataset].manifest, recording, DATASETS[dataset].folder
+        )
+    ]
 
 
 def made_here(dataset, path):
@@ -71,13 +84,19 @@ def named_files(wildcards):
 def existing_files(wildcards):
     """The files of a recording that can be an input; decode refuses a recording whose files are missing."""
     paths = files_of(wildcards.dataset, wildcards.recording)
-    return [path for path in paths if made_here(wildcards.dataset, path) or Path(path).exists()]
+    return [
+        path
+        for path in paths
+        if made_here(wildcards.dataset, path) or Path(path).exists()
+    ]
 
 
 def recordings(dataset, *kinds):
     """Names of the recordings of some kinds; of all kinds if none is given."""
     found = DATASETS[dataset].manifest.recordings
-    return [recording.name for recording in found if not kinds or recording.kind in kinds]
+    return [
+        recording.name for recording in found if not kinds or recording.kind in kinds
+    ]
 
 
 def kind_of(dataset, recording):
@@ -87,13 +106,21 @@ def kind_of(dataset, recording):
 
 def screened(dataset):
     """What `screen` wrote of a data set: which recordings can be used, and how long they are."""
-    return json.loads(Path(checkpoints.screen.get(dataset=dataset).output.screen).read_text(encoding="utf-8"))
+    return json.loads(
+        Path(checkpoints.screen.get(dataset=dataset).output.screen).read_text(
+            encoding="utf-8"
+        )
+    )
 
 
 def usable(dataset):
     """Recordings, calibration runs left out, that decode did not refuse."""
     known = screened(dataset)["recordings"]
-    return [name for name in known if known[name]["usable"] and kind_of(dataset, name) != "calibration"]
+    return [
+        name
+        for name in known
+        if known[name]["usable"] and kind_of(dataset, name) != "calibration"
+    ]
 
 
 def has_volatility(dataset, recording):
@@ -116,12 +143,18 @@ def weights_of(wildcards):
     if not has_volatility(wildcards.dataset, wildcards.recording):
         return []
     folder = f"results/{wildcards.dataset}/{wildcards.recording}/{wildcards.axis}"
-    return [f"{folder}/{definition}/weights.parquet" for definition in definitions(wildcards.dataset)]
+    return [
+        f"{folder}/{definition}/weights.parquet"
+        for definition in definitions(wildcards.dataset)
+    ]
 
 
 def tables_of(wildcards, table):
     """One table of the volatility stage for every definition."""
-    return [path.replace("weights.parquet", f"{table}.parquet") for path in weights_of(wildcards)]
+    return [
+        path.replace("weights.parquet", f"{table}.parquet")
+        for path in weights_of(wildcards)
+    ]
 
 
 def garch_of(wildcards):
@@ -136,7 +169,10 @@ def dcc_of(wildcards):
 
 def all_integrity(wildcards):
     """Integrity record of every recording of a data set."""
-    return [f"results/{wildcards.dataset}/{name}/integrity.json" for name in recordings(wildcards.dataset)]
+    return [
+        f"results/{wildcards.dataset}/{name}/integrity.json"
+        for name in recordings(wildcards.dataset)
+    ]
 
 
 def all_noise(wildcards):
@@ -147,22 +183,24 @@ def all_noise(wildcards):
 
 def calibration_frames(wildcards):
     """Frames of the calibration recordings."""
-    return [f"results/{wildcards.dataset}/{name}/frames.parquet" for name in recordings(wildcards.dataset, "calibration")]
+    return [
+        f"results/{wildcards.dataset}/{name}/frames.parquet"
+        for name in recordings(wildcards.dataset, "calibration")
+    ]
 
 
 def calibration_integrity(wildcards):
     """Integrity records of the calibration recordings."""
-    return [path.replace("frames.parquet", "integrity.json") for path in calibration_frames(wildcards)]
+    return [
+        path.replace("frames.parquet", "integrity.json")
+        for path in calibration_frames(wildcards)
+    ]
 
 
 def calibration_references(wildcards):
     """Logged table rates of the calibration recordings that have one."""
-    known = DATASETS[wildcards.dataset].manifest
-    return [
-        path
-        for name in recordings(wildcards.dataset, "calibration")
-        for path in reference_path(wildcards.dataset, known.recording(name))
-    ]
+    names = recordings(wildcards.dataset, "calibration")
+    return [path for name in names for path in reference_path(wildcards.dataset, name)]
 
 
 def noise_source(wildcards):
@@ -170,21 +208,25 @@ def noise_source(wildcards):
     names = usable(wildcards.dataset)
     order = {kind: rank for rank, kind in enumerate(("static", "thermal", "free"))}
     about = screened(wildcards.dataset)["recordings"]
-    names.sort(key=lambda name: (order.get(kind_of(wildcards.dataset, name), len(order)), -about[name]["duration_s"]))
+    names.sort(
+        key=lambda name: (
+            order.get(kind_of(wildcards.dataset, name), len(order)),
+            -about[name]["duration_s"],
+        )
+    )
     return [f"results/{wildcards.dataset}/{name}/rates.parquet" for name in names[:1]]
 
 
 def reference_path(dataset, recording):
     """The logged true rate of a recording, where there is one."""
     known = DATASETS[dataset]
-    if recording.reference is None or recording.reference.kind != "file":
-        return []
-    return [str(known.folder / known.manifest.folder / recording.reference.file)]
+    path = logged_reference(known.manifest, recording, known.folder)
+    return [str(path)] if path is not None else []
 
 
 def reference_file(wildcards):
     """The logged true rate of the job's recording, where there is one."""
-    return reference_path(wildcards.dataset, DATASETS[wildcards.dataset].manifest.recording(wildcards.recording))
+    return reference_path(wildcards.dataset, wildcards.recording)
 
 
 def artefacts_of(wildcards):
@@ -195,11 +237,23 @@ def artefacts_of(wildcards):
         paths.append(f"results/{dataset}/{recording}/rates.parquet")
         for axis in DATASETS[dataset].board.axes:
             folder = f"results/{dataset}/{recording}/{axis}"
-            tables = ("allan", "spectrum", "metrics", "correlation", "fused", "methods", "crosscheck")
+            tables = (
+                "allan",
+                "spectrum",
+                "metrics",
+                "correlation",
+                "fused",
+                "methods",
+                "crosscheck",
+            )
             paths += [f"{folder}/{table}.parquet" for table in tables]
             if has_volatility(dataset, recording):
                 parts = ("arch_lm", "garch", "dcc", "weights")
-                paths += [f"{folder}/{name}/{part}.parquet" for name in definitions(dataset) for part in parts]
+                paths += [
+                    f"{folder}/{name}/{part}.parquet"
+                    for name in definitions(dataset)
+                    for part in parts
+                ]
     return paths
 
 
@@ -208,6 +262,14 @@ def index_command():
     headlines = [f"results/{name}/headline.json" for name in LOADED.datasets]
     there = [path for path in headlines if Path(path).exists()]
     return " ".join(
-        [f"{RUN}index --input headlines", *map(shlex.quote, there), "--output page reports/index.html"]
-        + ["--options", shlex.quote(json.dumps({"problems": PROBLEMS})), "--log results/logs/index.log"]
+        [
+            f"{RUN}index --input headlines",
+            *map(shlex.quote, there),
+            "--output page reports/index.html",
+        ]
+        + [
+            "--options",
+            shlex.quote(json.dumps({"problems": PROBLEMS})),
+            "--log results/logs/index.log",
+        ]
     )

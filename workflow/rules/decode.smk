@@ -38,5 +38,6 @@ checkpoint screen:
         options=stage("manifest"),
         code=code("screen"),
     shell:
-        RUN + "screen --input integrity {input.integrity:q} --output screen {output.screen}"
+        RUN
+        + "screen --input integrity {input.integrity:q} --output screen {output.screen}"
         " --options {params.options:q} --code {params.code} --log {log}"

@@ -20,7 +20,8 @@ rule measure:
         options=stage("board", "engine", "metrics"),
         code=code("measure"),
     shell:
-        RUN + "measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods}"
+        RUN
+        + "measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods}"
         " --output allan {output.allan} --output spectrum {output.spectrum} --output metrics {output.metrics} --output correlation {output.correlation}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -46,10 +47,12 @@ rule crosscheck:
         mem_mb=4000,
         runtime=60,
     params:
-        options=stage("board", "engine", "volatility", "fusion", "metrics", "crosscheck"),
+        options=stage(
+            "board", "engine", "volatility", "fusion", "metrics", "crosscheck"
+        ),
         code=code("crosscheck"),
     shell:
-        RUN + "crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
+        RUN
+        + "crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
         " --output crosscheck {output.crosscheck}"
         " --options {params.options:q} --code {params.code} --log {log}"
-

@@ -17,10 +17,20 @@ rule report:
         mem_mb=4000,
         runtime=20,
     params:
-        options=stage("manifest", "board", "integrity", "rest", "volatility", "fusion", "metrics", "crosscheck"),
+        options=stage(
+            "manifest",
+            "board",
+            "integrity",
+            "rest",
+            "volatility",
+            "fusion",
+            "metrics",
+            "crosscheck",
+        ),
         code=code("report"),
     shell:
-        RUN + "report --input calibration {input.calibration} --input screen {input.screen}"
+        RUN
+        + "report --input calibration {input.calibration} --input screen {input.screen}"
         " --input integrity {input.integrity:q} --input noise {input.noise:q} --input artefacts {input.artefacts:q}"
         " --output page {output.page} --output headline {output.headline}"
         " --options {params.options:q} --code {params.code} --log {log}"
@@ -65,5 +75,6 @@ rule verdict:
         options=json.dumps({"problems": PROBLEMS}),
         code=code("verdict"),
     shell:
-        RUN + "verdict --input screens {input.screens:q} --input page {input.page} --output verdict {output.verdict}"
+        RUN
+        + "verdict --input screens {input.screens:q} --input page {input.page} --output verdict {output.verdict}"
         " --options {params.options:q} --code {params.code} --log {log}"

@@ -17,5 +17,6 @@ rule simulate:
         options=stage("board"),
         code=code("simulate"),
     shell:
-        RUN + "simulate --input twin {input.twin} --output dump {output.dump} --output truth {output.truth}"
+        RUN
+        + "simulate --input twin {input.twin} --output dump {output.dump} --output truth {output.truth}"
         " --output reference {output.reference} --options {params.options:q} --code {params.code} --log {log}"
