@@ -7,11 +7,12 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from vgyro.board import Board
+from vgyro.complaints import did_you_mean
 from vgyro.config import Analysis, merge
 from vgyro.dataset import Kind
 from vgyro.errors import ConfigError
 from vgyro.units import arw_deg_rt_h
-from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
+from vgyro.validation import Problem, StrictModel, parse_model
 
 EVERY_GYRO = "all"
 FaultKind = Literal["drift", "step", "burst", "noise", "scale", "stuck", "dropout"]
