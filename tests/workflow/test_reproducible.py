@@ -55,6 +55,6 @@ def test_progress_is_shown_and_units_are_inside(lab) -> None:
     assert rates
     for path in rates:
         record = json.loads(pq.read_schema(path).metadata[b"vgyro"])
-        assert record["units"]["gyro1"] == "deg/s"
+        assert record["units"]["g1"] == "deg/s"
         assert set(record["provenance"]) == {"inputs", "options", "code"}
         assert re.fullmatch(r"[0-9a-f]{64}", record["provenance"]["code"])
