@@ -1,0 +1,50 @@
+"""Papers: the tables and claims of one paper again, from its twin, as a page and as CSV."""
+
+from __future__ import annotations
+
+import logging
+
+from vgyro.board import Board
+from vgyro.config import MetricsOptions, VolatilityOptions
+from vgyro.dataset import Manifest
+from vgyro.papers import compare, csv_of, judge, load_paper
+from vgyro.papers.implied_cells import implied_cells, implied_figures
+from vgyro.storage.tables import write_text
+from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.papers_evidence import gather
+from vgyro.tasks.papers_page import paper_page
+from vgyro.tasks.papers_plots import figures
+
+
+def main(task: Task) -> None:
+    """Read one twin's artefacts, compare, judge, write the page and the CSV files.
+
+    inputs  : artefacts;  outputs : page, table1, table2, table3
+    options : dataset (the paper's name), manifest, board, analysis (volatility, metrics)
+    """
+    analysis = task.options.get("analysis", {})
+    manifest = Manifest.model_validate(task.options["manifest"])
+    board = Board.model_validate(task.options["board"])
+    paper = load_paper(task.options["dataset"])
+    evidence = gather(
+        task.inputs["artefacts"],
+        manifest,
+        board,
+        VolatilityOptions.model_validate(analysis.get("volatility", {})),
+        MetricsOptions.model_validate(analysis.get("metrics", {})),
+    )
+    implied = implied_cells(paper)
+    comparisons = [compare(paper, table, evidence, implied) for table in paper.tables]
+    for comparison in comparisons:
+        name = f"table{comparison.table.number}"
+        if name in task.outputs:
+            write_text(task.output(name), csv_of([comparison]))
+        missing = [cell for cell in comparison.cells if cell.published is not None and cell.reason]
+        logging.info("%s: %d readings, %d without a figure of ours", name, len(comparison.cells), len(missing))
+    verdicts = [(claim, judge(claim, evidence, implied_figures(paper))) for claim in paper.claims]
+    plots = figures(paper.name, evidence.gyros, task.inputs["artefacts"])
+    write_text(task.output("page"), paper_page(paper, manifest, comparisons, verdicts, plots))
+
+
+if __name__ == "__main__":
+    run_task(main)

@@ -1,0 +1,155 @@
+"""Our figures for the papers' tables: rows of the twin's artefacts, and those of the 1 Hz series, which is L's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vgyro.board import Board
+from vgyro.config import MetricsOptions, VolatilityOptions
+from vgyro.dataset import ConstantReference, Manifest
+from vgyro.papers import Evidence, with_single
+from vgyro.papers.series import series_figures, with_extremes
+from vgyro.storage.tables import read_columns
+from vgyro.tasks.volatility_series import sample_rate
+from vgyro.volatility import block_means
+
+Rows = list[dict[str, Any]]
+# 95 % limits of an estimate with this standard error.
+TWO_SIDED = 1.959964
+# Liu et al. (2015), section 5: the fourth gyro is faulty from 1000 s on, and its weight is near zero after 2500 s.
+FAULTY, STRETCHES = 4, {"before 1000 s": (0.0, 1000.0), "after 2500 s": (2500.0, math.inf)}
+
+
+def gather(
+    paths: Sequence[Path], manifest: Manifest, board: Board, volatility: VolatilityOptions, metrics: MetricsOptions
+) -> Evidence:
+    """Evidence of one twin from all its artefacts.
+
+    paths : files under …/<recording>/[<axis>/[<definition>/]]<table>.parquet; tables that no cell needs are passed over
+    """
+    gyros = [gyro.name for gyro in board.array(board.axes[0])]
+    rows: dict[str, Rows] = {}
+    for path in paths:
+        read = READERS.get(path.stem)
+        if read is not None:
+            rows.setdefault(path.stem, []).extend(read(path, gyros))
+    if "metrics" in rows:
+        rows["metrics"] = with_single(with_table_means(rows["metrics"], manifest), gyros)
+    for static in at_rest(paths, manifest):
+        place = {"recording": static.parts[-3], "axis": static.parts[-2]}
+        names, values, stretch, rate_hz = _block_series(static, gyros, volatility)
+        figures = series_figures(place, names, len(gyros), values, stretch, rate_hz, metrics)
+        rows.setdefault("metrics_1hz", []).extend(with_extremes(figures.metrics, gyros, gyros[FAULTY - 1]))
+        rows.setdefault("factors_1hz", []).extend(figures.factors)
+    return Evidence(rows, gyros)
+
+
+def _records(path: Path, **place: str) -> Rows:
+    table = read_columns(path)
+    return [{**place, **dict(zip(table, values, strict=True))} for values in zip(*table.values(), strict=True)]
+
+
+def _metrics(path: Path, _gyros: Sequence[str]) -> Rows:
+    return _records(path)
+
+
+def _correlation(path: Path, _gyros: Sequence[str]) -> Rows:
+    return _records(path, recording=path.parts[-3])
+
+
+def _of_definition(path: Path) -> dict[str, str]:
+    return {"recording": path.parts[-4], "axis": path.parts[-3], "definition": path.parts[-2]}
+
+
+def _arch_lm(path: Path, _gyros: Sequence[str]) -> Rows:
+    return _records(path, **_of_definition(path))
+
+
+def _garch(path: Path, _gyros: Sequence[str]) -> Rows:
+    return [_with_limits(row, ("omega", "alpha", "beta")) for row in _first_and_whole(path)]
+
+
+def _dcc(path: Path, _gyros: Sequence[str]) -> Rows:
+    return [_with_limits(row, ("a", "b")) for row in _first_and_whole(path)]
+
+
+def _first_and_whole(path: Path) -> Rows:
+    """Rows of window 0, the first 360 samples, and of window -1, the whole record."""
+    return [row for row in _records(path, **_of_definition(path)) if row["window"] <= 0]
+
+
+def _with_limits(row: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Add low_x and high_x: the estimate ± 1.96 standard errors."""
+    for name in names:
+        half = TWO_SIDED * row[f"se_{name}"]
+        row = {**row, f"low_{name}": row[name] - half, f"high_{name}": row[name] + half}
+    return row
+
+
+def _weights(path: Path, gyros: Sequence[str]) -> Rows:
+    """Mean weight of each gyro before the fault and after 2500 s."""
+    table, rows = read_columns(path), []
+    for model, mode in sorted(set(zip(table["model"], table["mode"], strict=True))):
+        chosen = (table["model"] == model) & (table["mode"] == mode)
+        for name, (start, stop) in STRETCHES.items():
+            inside = chosen & (table["time"] >= start) & (table["time"] < stop)
+            for gyro in gyros:
+                weights = table[f"w_{gyro}"][inside]
+                value = float(np.mean(weights)) if weights.size else math.nan
+                about = {"model": model, "mode": mode, "gyro": gyro, "stretch": name, "value": value}
+                rows.append({**_of_definition(path), **about, "note": "" if weights.size else "no sample there"})
+    return rows
+
+
+READERS: dict[str, Callable[[Path, Sequence[str]], Rows]] = {
+    "metrics": _metrics, "correlation": _correlation, "arch_lm": _arch_lm, "garch": _garch, "dcc": _dcc,
+    "weights": _weights,
+}  # fmt: skip
+
+
+def with_table_means(rows: Rows, manifest: Manifest) -> Rows:
+    """Add the mean output at a constant rate (J, Table 3): the set rate and the mean error."""
+    known = {(row["recording"], row["method"], row["definition"]) for row in rows if row["metric"] == "mean"}
+    for recording in manifest.recordings:
+        if isinstance(recording.reference, ConstantReference):
+            for row in [row for row in rows if row["recording"] == recording.name and row["metric"] == "error_mean"]:
+                if (row["recording"], row["method"], row["definition"]) not in known:
+                    moved = {name: row[name] + recording.reference.rate for name in ("value", "low", "high")}
+                    rows = [*rows, {**row, **moved, "metric": "mean", "note": "set rate + mean error"}]
+    return rows
+
+
+def at_rest(paths: Sequence[Path], manifest: Manifest) -> list[Path]:
+    """fused.parquet of every static recording."""
+    static = {recording.name for recording in manifest.recordings if recording.kind == "static"}
+    return [path for path in paths if path.stem == "fused" and path.parts[-3] in static]
+
+
+def _block_series(
+    fused: Path, gyros: Sequence[str], volatility: VolatilityOptions
+) -> tuple[list[tuple[str, str]], np.ndarray, np.ndarray, float]:
+    """(method, definition) of each column, block means [M, S], stretch [M], rate: single gyros first, then methods.
+
+    fused : …/<recording>/<axis>/fused.parquet, with methods.parquet beside it and rates.parquet one folder up
+    """
+    rates_path = fused.parents[1] / "rates.parquet"
+    rates = read_columns(rates_path, ["time", "segment", "at_rest", *gyros])
+    rate_hz = sample_rate(rates_path, rates["time"])
+    methods = read_columns(fused.with_name("methods.parquet"), ["method", "definition", "column"])
+    ran = [row for row in zip(*methods.values(), strict=True) if row[2]]
+    block_hz = rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
+    rest = rates["at_rest"].astype(bool)
+
+    def means(column: np.ndarray) -> Any:
+        return block_means(column[:, None], rate_hz, block_hz, rates["segment"], rest, rates["time"])
+
+    # One column at a time: the record of all methods at the full rate is large.
+    series = [means(rates[gyro]) for gyro in gyros]
+    series += [means(read_columns(fused, [column])[column]) for _, _, column in ran]
+    names = [(gyro, "") for gyro in gyros] + [(str(method), str(definition)) for method, definition, _ in ran]
+    return names, np.hstack([found.values for found in series]), series[0].stretch, series[0].rate_hz
