@@ -51,6 +51,8 @@ def did_you_mean(word: str, known: Iterable[str], listed: bool = True) -> str:
     """Return "; did you mean …?" if a known word is near, else (if `listed`) "; known: …"."""
     known = list(known)
     close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    # Two letters swapped in a short word are below that cutoff.
+    close = close or [other for other in known if sorted(other) == sorted(word)]
     if close:
         return f"; did you mean {close[0]!r}?"
     return f"; known: {', '.join(known)}" if known and listed else ""

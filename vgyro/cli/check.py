@@ -53,7 +53,9 @@ def run(options: argparse.Namespace) -> int:
             print(f"{name}: {count} recording{'s' * (count != 1)}, {len(board.gyros)} gyros of board {board.name}")
         if problems:
             count = len(problems)
-            print(f"{count} mistake{'s' * (count != 1)}; {len(loaded.datasets)} data sets can run", file=sys.stderr)
+            able = len(loaded.datasets)
+            text = f"{count} mistake{'s' * (count != 1)}; {able} data set{'s' * (able != 1)} can run"
+            print(text, file=sys.stderr)
         elif not loaded.datasets:
             print(f"nothing wrong, and no data set in {options.raw}; start one with vgyro new-dataset")
         else:

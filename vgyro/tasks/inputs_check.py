@@ -14,8 +14,8 @@ from vgyro.board import Board
 from vgyro.config import Config, override_problems
 from vgyro.dataset import FileReference, Manifest
 from vgyro.errors import ConfigError
-from vgyro.storage.inputs import BOARDS, matching_files, read_config, read_dataset
-from vgyro.validation import InvalidFile, Problem, did_you_mean, locate
+from vgyro.storage.inputs import BOARDS, matching_files, read_board, read_config, read_dataset
+from vgyro.validation import InvalidFile, Problem, did_you_mean, locate, parse_yaml
 
 CONFIG = Path("config/config.yaml")
 RAW = Path("raw")
@@ -79,7 +79,8 @@ def load_dataset(
     try:
         manifest, board = read_dataset(path, boards)
     except ConfigError as error:
-        return None, problems + as_problems(error, source)
+        found = as_problems(error, source)
+        return None, sorted(problems + found + _board_too(path, found, boards), key=lambda problem: problem.line)
     found = override_problems(config.analysis, manifest.analysis, source)
     if files:
         found += _missing_files(manifest, path.parent, source)
@@ -134,6 +135,21 @@ def _name_problems(path: Path) -> list[Problem]:
     return []
 
 
+def _board_too(path: Path, found: list[Problem], boards: Path) -> list[Problem]:
+    """Mistakes about the board of a manifest that has others, so that all are named at once."""
+    source = str(path)
+    if any(problem.source != source or problem.key in {"", "board"} for problem in found):
+        return []
+    text = path.read_text(encoding="utf-8")
+    try:
+        read_board(parse_yaml(text, source)[0]["board"], path.parent, boards)
+    except InvalidFile as error:
+        return error.problems
+    except ConfigError as error:
+        return locate([Problem(source, 1, "board", error.what)], text)
+    return []
+
+
 def _missing_files(manifest: Manifest, folder: Path, source: str) -> list[Problem]:
     base = folder / Path(manifest.folder).expanduser()
     if not base.is_dir():
@@ -144,10 +160,16 @@ def _missing_files(manifest: Manifest, folder: Path, source: str) -> list[Proble
         for number, pattern in enumerate(recording.files):
             missing = [file for file in matching_files(base, pattern) if not file.exists()]
             if missing:
-                near = did_you_mean(pattern, sorted(entry.name for entry in base.iterdir()), listed=False)
                 key = f"recordings.{index}.files.{number}"
-                problems.append(Problem(source, 1, key, f"no such file: {missing[0]}{near}"))
+                problems.append(Problem(source, 1, key, _missing(pattern, base, missing[0])))
         reference = reference_file(manifest, recording.name, folder)
         if reference is not None and not reference.is_file():
             problems.append(Problem(source, 1, f"recordings.{index}.reference.file", f"no such file: {reference}"))
     return problems
+
+
+def _missing(pattern: str, base: Path, path: Path) -> str:
+    if any(sign in pattern for sign in "*?["):
+        return f"no file fits {path}"
+    near = did_you_mean(pattern, sorted(entry.name for entry in base.iterdir()), listed=False)
+    return f"no such file: {path}{near}"
