@@ -91,7 +91,7 @@ def compare(a: dict[str, Figure], b: dict[str, Figure], tolerance: float) -> lis
             continue
         difference = second.value - first.value
         size = max(abs(first.value), abs(second.value))
-        relative = difference / size if size > 0 else 0.0
+        relative = 0.0 if size == 0 else difference / size
         verdict = _verdict(first, second, tolerance)
         changes.append(
             Change(name, _number(first), _number(second), _finite(difference), _finite(relative), second.unit, verdict)
