@@ -184,11 +184,27 @@ def test_conditional_weights_go_to_their_method(make_array):
 
 def test_warning_in_motion(make_array):
     array = make_array(100, [0.1, 0.1, 0.1], weights=weights_for(100, 3))
+    array = replace(array, at_rest=np.zeros(100, dtype=bool))
     moving = replace(PARAMETERS, in_motion=True)
     notes = {o.definition: o.note for o in run_methods(array, moving, select(["dcc_causal"]), DEFINITIONS)}
     assert "bias" in notes["level"]
     assert notes["residual"] == ""
     assert all(o.note == "" for o in run_methods(array, PARAMETERS, select(["dcc_causal"]), DEFINITIONS))
+
+
+def test_reason_why_there_are_no_weights(make_array):
+    array = replace(make_array(60, [0.1, 0.1]), no_weights={("dcc", "causal", "level"): "too short: 60 samples"})
+    (outcome,) = run_methods(array, PARAMETERS, select(["dcc_causal"]), ("level",))
+    assert (outcome.fused, outcome.column, outcome.note) == (None, "", "too short: 60 samples.")
+
+
+def test_share_of_equal_weights_is_told(make_array):
+    weights = weights_for(100, 3)
+    weights["dcc", "causal", "level"][:25] = 1 / 3
+    (outcome,) = run_methods(
+        make_array(100, [0.1] * 3, weights=weights), PARAMETERS, select(["dcc_causal"]), ("level",)
+    )
+    assert "equal weights for 25.0%" in outcome.note
 
 
 def test_what_cannot_run_says_why(make_array):

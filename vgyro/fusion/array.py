@@ -51,6 +51,7 @@ class ArrayRates:
     rate    : array [T, N], deg/s;  rate_hz : sample rate, Hz
     segment : array [T], number of the gap-free stretch;  at_rest : array [T] of bool
     weights : (model, mode, definition) → weights [T, N], one row a sample; see vgyro.fusion.weights.SampleWeights
+    no_weights : the same keys → why there are none
     """
 
     rate: np.ndarray
@@ -59,6 +60,7 @@ class ArrayRates:
     at_rest: np.ndarray
     noise: ArrayNoise
     weights: Mapping[WeightKey, np.ndarray] = field(default_factory=dict)
+    no_weights: Mapping[WeightKey, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         samples = len(self.rate)

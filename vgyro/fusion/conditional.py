@@ -27,13 +27,23 @@ def conditional(model: str, mode: str) -> Callable[[ArrayRates, FilterParameters
     def fuse(array: ArrayRates, parameters: FilterParameters) -> Fused:
         key = (model, mode, parameters.definition)
         if key not in array.weights:
-            raise CannotRun(
-                f"there are no {mode} weights of {model.upper()} for the definition {parameters.definition!r}"
-            )
+            none = f"there are no {mode} weights of {model.upper()} for this definition of r_t"
+            raise CannotRun(array.no_weights.get(key, none))
         weights = array.weights[key]
         if weights.shape != array.rate.shape:
             raise CannotRun(f"weights {weights.shape} do not fit the rates {array.rate.shape}")
-        note = WARNINGS.get(parameters.definition, "") if parameters.in_motion else ""
+        note = _note(array, parameters, weights)
         return Fused(np.einsum("tn,tn->t", array.rate, weights), weights, note=note)
 
     return fuse
+
+
+def _note(array: ArrayRates, parameters: FilterParameters, weights: np.ndarray) -> str:
+    notes = []
+    # Where stretches at rest are known, only they were analysed: the motion has equal weights.
+    if parameters.in_motion and not array.at_rest.any():
+        notes.append(WARNINGS.get(parameters.definition, ""))
+    equal = float(np.mean(np.ptp(weights, axis=1) == 0))
+    if equal > 0:
+        notes.append(f"equal weights for {equal:.1%} of the samples: no window before them, motion, or a gap near")
+    return "; ".join(note for note in notes if note)

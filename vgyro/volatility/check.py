@@ -9,7 +9,9 @@ import numpy as np
 PERSISTENCE_MAX = 1.0 - 1e-6
 GRID_ALPHA = (0.0, 0.005, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32, 0.45, 0.65, 0.9)
 GRID_PERSISTENCE = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985, 0.993, 0.998)
-BEST = 4
+BEST = 3
+BOUNDS = ((1e-8, 5.0), (0.0, PERSISTENCE_MAX), (0.0, 1.0))
+SLOPE_STEP = 1e-6
 
 
 def greatest_log_likelihood(e: np.ndarray) -> float:
@@ -29,25 +31,36 @@ def greatest_log_likelihood(e: np.ndarray) -> float:
     starts = np.column_stack([1.0 - points[:, 0], points])
     values = _log_likelihood(unit, starts)
     best = float(values.max())
-    bounds = [(1e-8, 5.0), (0.0, PERSISTENCE_MAX), (0.0, 1.0)]
     for index in np.argsort(-values, kind="stable")[:BEST]:
         found = minimize(
-            lambda point: -_log_likelihood(unit, point[None, :])[0], starts[index], bounds=bounds, method="L-BFGS-B",
-            options={"ftol": 1e-13, "gtol": 1e-7, "maxiter": 500},
+            _cost_and_slope, starts[index], args=(unit,), jac=True, bounds=BOUNDS, method="L-BFGS-B",
+            options={"ftol": 1e-13, "gtol": 1e-6, "maxiter": 500},
         )  # fmt: skip
         best = max(best, -float(found.fun))
     return best - len(e) * math.log(scale)
+
+
+def _cost_and_slope(point: np.ndarray, e: np.ndarray) -> tuple[float, np.ndarray]:
+    """Minus the log-likelihood and its slope by differences within the bounds, all in one pass over the series."""
+    low, high = np.array(BOUNDS).T
+    below = np.maximum(point - SLOPE_STEP * np.eye(3), low)
+    above = np.minimum(point + SLOPE_STEP * np.eye(3), high)
+    values = _log_likelihood(e, np.vstack([point, below, above]))
+    width = np.diagonal(above - below)
+    return -float(values[0]), -(values[4:] - values[1:4]) / width
 
 
 def _log_likelihood(e: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Log-likelihood of a series of mean square 1 at many points (ω, α + β, α/(α + β)) [P, 3]."""
     omega, total, share = points.T
     alpha, beta = total * share, total * (1.0 - share)
-    variance = omega + total
-    summed = np.zeros(len(points))
-    for square in e**2:
-        summed += np.log(variance) + square / variance
-        variance = omega + alpha * square + beta * variance
+    square = e**2
+    variance = np.empty((len(e), len(points)))
+    variance[0] = omega + total
+    driven = omega + np.outer(square, alpha)
+    for t in range(1, len(e)):
+        variance[t] = driven[t - 1] + beta * variance[t - 1]
+    summed = (np.log(variance) + square[:, None] / variance).sum(axis=0)
     return -0.5 * (len(e) * math.log(2.0 * math.pi) + summed)
 
 
