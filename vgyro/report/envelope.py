@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 MAX_POINTS = 2000
+GAP = 3.0  # times the usual step
 
 
 def envelope(time: np.ndarray, values: np.ndarray, points: int = MAX_POINTS) -> tuple[np.ndarray, np.ndarray]:
@@ -60,3 +61,15 @@ def stretches(time: np.ndarray, flag: np.ndarray) -> list[tuple[float, float]]:
     return [
         (float(time[start]), float(time[stop - 1])) for start, stop in zip(changes[::2], changes[1::2], strict=True)
     ]
+
+
+def broken(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """NaN put between two points that a gap in time parts, so that no line bridges it. time [T], values [T, N]"""
+    step = np.diff(time)
+    if not len(step):
+        return time, values
+    # An envelope's two points of one run may share a time: the usual step is that of two points together.
+    after = (
+        np.flatnonzero(step > GAP * 2 * np.median(step[step > 0])) + 1 if (step > 0).any() else np.empty(0, np.int64)
+    )
+    return np.insert(time, after, time[after]), np.insert(values.astype(float), after, np.nan, axis=0)

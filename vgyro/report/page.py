@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from vgyro.report.html import environment
 
+EMPTY = Markup("")
 FOOTER = "vgyro: every figure is computed by the pipeline; this page lays artefacts out."
 
 
@@ -27,7 +28,7 @@ class Section:
 
     id: str
     title: str
-    html: Markup = Markup("")
+    html: Markup = EMPTY
     children: tuple[Section, ...] = ()
     aside: str | Markup = ""
     opened: bool = False

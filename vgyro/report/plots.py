@@ -18,7 +18,7 @@ from vgyro.report.colours import ACCENT, GRID, INK, MUTED, PAPER, marks, series_
 from vgyro.report.html import macro
 
 if TYPE_CHECKING:
-    from bokeh.plotting import figure as Figure
+    from bokeh.plotting import figure
 
 Scale = Literal["linear", "log"]
 SVG_DASHES = {"solid": "", "dashed": "6 3", "dotted": "2 3", "dotdash": "2 3 6 3"}
@@ -30,8 +30,8 @@ class Curve:
 
     name  : unique in the plot;  label : what the legend says;  x, y : arrays [T]; NaN breaks the line
     low, high : interval at each point, drawn as a thin bar;  colour : number in the palette, dashes follow from it
-    width : px;  points : also draw a mark at each point;  visible : shown from the start;  group : heading in the legend
-    line : whether the points are joined
+    width : px;  line, points : whether the points are joined, whether each is marked;  visible : shown from the start
+    group : heading in the legend;  ink : the colour of text, for the curve that the others are held against
     """
 
     name: str
@@ -85,14 +85,23 @@ def curve_plot(
     return macro("plot", identifier=identifier, title=title, summary=summary, item=item, legend=legend)
 
 
-def _empty(x: Axis, y: Axis, height: int) -> Figure:
+def _empty(x: Axis, y: Axis, height: int) -> figure:
     from bokeh.plotting import figure
 
     plot = figure(
-        height=height, sizing_mode="stretch_width", x_axis_type=x.scale, y_axis_type=y.scale, x_axis_label=x.label,
-        y_axis_label=y.label, tools="pan,box_zoom,wheel_zoom,reset,save", active_drag="box_zoom", output_backend="canvas",
-        background_fill_color=None, border_fill_color=None, outline_line_color=GRID, min_border_right=12,
-    )  # fmt: skip
+        height=height,
+        sizing_mode="stretch_width",
+        x_axis_type=x.scale,
+        y_axis_type=y.scale,
+        x_axis_label=x.label,
+        y_axis_label=y.label,
+        tools="pan,box_zoom,wheel_zoom,reset,save",
+        active_drag="box_zoom",
+        background_fill_color=None,
+        border_fill_color=None,
+        outline_line_color=GRID,
+        min_border_right=12,
+    )
     plot.toolbar.logo = None
     plot.toolbar.autohide = True
     for ranged in (plot.x_range, plot.y_range):
@@ -109,14 +118,14 @@ def _empty(x: Axis, y: Axis, height: int) -> Figure:
     return plot
 
 
-def _mark_spans(plot: Figure, spans: Sequence[tuple[float, float]]) -> None:
+def _mark_spans(plot: figure, spans: Sequence[tuple[float, float]]) -> None:
     from bokeh.models import BoxAnnotation
 
     for start, stop in spans:
         plot.add_layout(BoxAnnotation(left=start, right=stop, fill_color=ACCENT, fill_alpha=0.08, level="underlay"))
 
 
-def _mark_levels(plot: Figure, levels: Sequence[float]) -> None:
+def _mark_levels(plot: figure, levels: Sequence[float]) -> None:
     from bokeh.models import Span
 
     for level in levels:
@@ -142,7 +151,7 @@ def _single(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
-def _draw(plot: Figure, curve: Curve, source: Any) -> Any:
+def _draw(plot: figure, curve: Curve, source: Any) -> Any:
     colour = INK if curve.ink else series_mark(curve.colour)
     common = {"source": source, "name": curve.name, "visible": curve.visible}
     if curve.low is not None and curve.high is not None:
@@ -161,7 +170,7 @@ def _draw(plot: Figure, curve: Curve, source: Any) -> Any:
     return drawn
 
 
-def _add_hover(plot: Figure, renderers: list[Any], x: Axis, y: Axis) -> None:
+def _add_hover(plot: figure, renderers: list[Any], x: Axis, y: Axis) -> None:
     from bokeh.models import HoverTool
 
     tooltips = [("", "$name"), (x.label, "@x{%.5g}"), (y.label, "@$name{%.4g}")]
@@ -170,7 +179,7 @@ def _add_hover(plot: Figure, renderers: list[Any], x: Axis, y: Axis) -> None:
     )
 
 
-def _as_json(plot: Figure, identifier: str) -> str:
+def _as_json(plot: figure, identifier: str) -> str:
     """Bokeh's JSON of a plot, with ids that depend on the plot's name alone."""
     from bokeh.embed import json_item
 

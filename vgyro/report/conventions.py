@@ -1,0 +1,86 @@
+"""The conventions behind every figure, and where the page comes from."""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from vgyro.report.html import definitions, details, join, paragraph
+from vgyro.report.model import DatasetPart, Figure, Record
+from vgyro.report.tables import Cell, Column, render_table
+
+CONVENTIONS = (
+    ("Allan model", "σ² = 3Q²/τ² + N²/τ + (2 ln2/π)B² + K²τ/3 + R²τ²/2, τ in s, rate in deg/s; overlapping estimator"),
+    ("spectrum", "two-sided: N², B²/(2πf), K²/(2πf)²; a one-sided Welch density is √2 larger, and plots show that one"),
+    ("ARW, N", "N [deg/√h] = 60·N [deg/s/√Hz, two-sided]; read at 1 s and fitted are two figures: a low-pass fakes the first"),
+    ("RRW, K", "K [deg/h/√h] = 60·K [deg/h/√s]"),
+    ("bias instability, B", "flicker coefficient, min σ/0.664 where the curve has a flat floor"),
+    ("bias drift", "the papers' name for the minimum of the Allan curve, min σ, given with its τ"),
+    ("improvement factor", "mean of a figure over the single gyros / that of the virtual gyro (Liu et al. 2015, eq. 18)"),
+    ("intervals", "95 %: chi² with equivalent degrees of freedom for Allan deviations, moving-block bootstrap else"),
+    ("gaps", "estimates are made over gap-free stretches; none bridges a gap"),
+    ("bandwidth", "−3 dB and noise-equivalent, one-sided, of the method alone; DC gain 1: a constant rate passes as it is"),
+)  # fmt: skip
+
+
+def conventions_part(figures: dict[str, Figure]) -> Markup:
+    """The conventions, and the meaning of each figure."""
+    rows = [[Cell(figure.title), Cell(figure.unit), Cell(figure.meaning)] for figure in figures.values()]
+    columns = [Column("figure", numeric=False), Column("unit", numeric=False), Column("meaning", numeric=False)]
+    meanings = details("Meaning of every figure", render_table(columns, rows)) if rows else Markup("")
+    return join(definitions(CONVENTIONS), meanings)
+
+
+def provenance_part(dataset: DatasetPart) -> Markup:
+    """Files with their hashes, hashes of the options and of the code of each artefact, the options."""
+    files = [
+        [
+            Cell(recording.name),
+            Cell(str(entry.get("name", ""))),
+            Cell(f"{entry.get('bytes', 0):,}"),
+            _hash(entry.get("sha256")),
+        ]
+        for recording in dataset.recordings
+        for entry in recording.integrity.get("files") or []
+    ]
+    artefacts = [
+        [Cell(path), Cell(str(record.get("schema", ""))), *(_hash(value) for value in _hashes(record))]
+        for path, record in dataset.sources.items()
+    ]
+    words = "The same files, options and code give the same page, byte for byte. Hashes are the first of SHA-256."
+    parts: list[Markup | str] = [paragraph(words)]
+    if files:
+        columns = [
+            Column("recording", numeric=False),
+            Column("file", numeric=False),
+            Column("bytes"),
+            Column("SHA-256", numeric=False),
+        ]
+        parts.append(details("Data files", render_table(columns, files, compact=True)))
+    if artefacts:
+        names = ("artefact", "schema", "inputs", "options", "code")
+        columns = [Column(name, numeric=False) for name in names]
+        parts.append(details("Artefacts", render_table(columns, artefacts, compact=True)))
+    parts.append(details("Analysis options", definitions(_flat(dataset.options))))
+    return join(*parts)
+
+
+def _hashes(record: Record) -> tuple[str, str, str]:
+    provenance = record.get("provenance") or {}
+    inputs = ", ".join(f"{name} {str(value)[:8]}" for name, value in sorted((provenance.get("inputs") or {}).items()))
+    return inputs, str(provenance.get("options") or ""), str(provenance.get("code") or "")
+
+
+def _hash(value: object) -> Cell:
+    text = str(value or "—")
+    short = text if " " in text else text[:12]
+    return Cell(short, hint=text if text != short else "")
+
+
+def _flat(options: object, prefix: str = "") -> list[tuple[str, str]]:
+    if isinstance(options, dict):
+        return [
+            pair for key, value in options.items() for pair in _flat(value, f"{prefix}.{key}" if prefix else str(key))
+        ]
+    if isinstance(options, list | tuple):
+        return [(prefix, ", ".join(map(str, options)))]
+    return [(prefix, "not set" if options is None else str(options))]

@@ -1,0 +1,63 @@
+"""The cross-check: sampled results, computed again by an independent route."""
+
+from __future__ import annotations
+
+import math
+
+from markupsafe import Markup
+
+from vgyro.report.html import details, join, paragraph
+from vgyro.report.model import ArrayPart, rows_of
+from vgyro.report.numbers import MISSING, significant
+from vgyro.report.tables import Cell, Column, Row, render_table
+
+
+def crosscheck_part(array: ArrayPart) -> Markup:
+    """The table, closed if every check passed, open and red if not."""
+    table = array.tables.get("crosscheck")
+    if table is None or not len(table["check"]):
+        return paragraph("No cross-check was made.", "note")
+    columns = [
+        Column("check", numeric=False),
+        Column("against", numeric=False),
+        Column("window"),
+        Column("series", numeric=False),
+        Column("ours"),
+        Column("theirs"),
+        Column("difference"),
+        Column("tolerance"),
+        Column("unit", numeric=False),
+        Column("", numeric=False),
+    ]
+    rows = [_row(row) for row in rows_of(table)]
+    failed = failures(array)
+    total = len(rows)
+    html = render_table(columns, rows, "Sampled results, computed again by an independent route", compact=True)
+    if not failed:
+        return details(f"Cross-check: all {total} comparisons passed", html)
+    return details(
+        f"Cross-check: {failed} of {total} comparisons FAILED",
+        join(paragraph("A result differs from its independent recomputation by more than the tolerance.", "bad"), html),
+        opened=True,
+    )
+
+
+def failures(array: ArrayPart) -> int:
+    """How many comparisons did not pass."""
+    table = array.tables.get("crosscheck")
+    return 0 if table is None else int((~table["passed"].astype(bool)).sum())
+
+
+def _row(row: dict) -> Row:
+    passed = bool(row["passed"])
+    numbers = [
+        Cell(significant(float(row[name]), digits))
+        for name, digits in (("ours", 6), ("theirs", 6), ("difference", 2), ("tolerance", 2))
+    ]
+    window = "whole" if int(row["window"]) < 0 else str(int(row["window"]))
+    verdict = Cell("passed", tone="good") if passed else Cell("FAILED", tone="bad")
+    if not passed and math.isnan(float(row["difference"])):
+        verdict = Cell("FAILED: one side has no figure", tone="bad")
+    unit = str(row["unit"]) or MISSING
+    cells = (Cell(str(row["check"])), Cell(str(row["against"])), Cell(window), Cell(str(row["series"])), *numbers)
+    return Row((*cells, Cell(unit), verdict), tone="" if passed else "bad")

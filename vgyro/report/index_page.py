@@ -1,0 +1,90 @@
+"""The overview: every data set with its headline figures, mistakes in manifests, links to the papers' pages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from vgyro.report.html import badge, join, link, paragraph
+from vgyro.report.model import Record
+from vgyro.report.numbers import MISSING, duration, significant
+from vgyro.report.page import Section, render_page
+from vgyro.report.tables import Cell, Column, Tone, render_table
+
+COLUMNS = (
+    Column("data set", numeric=False),
+    Column("board", numeric=False),
+    Column("gyros"),
+    Column("recordings"),
+    Column("length"),
+    Column("bad gyros", numeric=False, hint="more than twice the median of their array"),
+    Column("best method by bias drift", numeric=False),
+    Column("improvement factor"),
+    Column("scale", numeric=False),
+    Column("status", numeric=False),
+)
+TONES: dict[str, Tone] = {"good": "good", "suspect": "warn", "refused": "bad"}
+MOST_NAMED = 4
+
+
+def render_index(
+    headlines: Sequence[Record], problems: Sequence[str] = (), papers: Sequence[tuple[str, str]] = ()
+) -> str:
+    """reports/index.html as text.
+
+    headlines : records of dataset_page.headline;  problems : mistakes in config and manifests, one text each
+    papers    : (title, path from the index) of the pages of published tables
+    """
+    parts = []
+    if problems:
+        parts.append(Section("problems", "Not run", join(*(paragraph(text, "bad") for text in problems))))
+    if headlines:
+        table = render_table(COLUMNS, [_row(record) for record in headlines])
+        parts.append(Section("datasets", "Data sets", table))
+    else:
+        words = "No data set yet: put a dataset.yaml and its files into raw/<name>/ and run snakemake again."
+        parts.append(Section("datasets", "Data sets", paragraph(words)))
+    if papers:
+        links = [join(paragraph(link(title, target))) for title, target in papers]
+        parts.append(Section("papers", "Published tables, computed again", join(*links)))
+    subtitle = "How good each gyro is, how good a virtual gyroscope made of them, and how sure that is"
+    return render_page("vgyro", parts, subtitle=subtitle, home="", contents=False)
+
+
+def _row(record: Record) -> list[Cell]:
+    name = link(record["title"], f"{record['dataset']}.html")
+    if record["simulated"]:
+        name = join(name, badge("SIMULATED", "warn"))
+    refused = record["refused"]
+    recordings = str(record["recordings"])
+    return [
+        Cell(name),
+        Cell(record["board"]),
+        Cell(str(record["gyros"]), f"axes {', '.join(record['axes'])}"),
+        Cell(recordings, f"{len(refused)} refused" if refused else ""),
+        Cell(duration(record["duration_s"])),
+        _bad(record["bad_gyros"]),
+        *_best(record["best"]),
+        Cell("nominal", tone="warn") if record["nominal_scale"] else Cell("measured"),
+        Cell(record["status"], tone=TONES[record["status"]]),
+    ]
+
+
+def _bad(bad: Sequence[Record]) -> Cell:
+    if not bad:
+        return Cell("none")
+    names = ", ".join(f"{one['gyro']} ({significant(one['factor'], 2)}×)" for one in bad[:MOST_NAMED])
+    more = f" and {len(bad) - MOST_NAMED} more" if len(bad) > MOST_NAMED else ""
+    return Cell(names + more, tone="bad")
+
+
+def _best(best: Any) -> tuple[Cell, Cell]:
+    if best is None:
+        why = "no array of gyros was analysed at rest"
+        return Cell(MISSING, tone="muted", hint=why), Cell(MISSING, tone="muted", hint=why)
+    limits = ""
+    if best["low"] is not None and best["high"] is not None:
+        limits = f"{significant(best['low'])} … {significant(best['high'])}"
+    shown = best["low"] is None or best["low"] > 1
+    factor = Cell(significant(best["value"]), limits, "" if shown else "muted", hint="" if shown else "not significant")
+    return Cell(best["label"], f"axis {best['axis']}, {best['recording']}"), factor

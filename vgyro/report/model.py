@@ -1,0 +1,128 @@
+"""What a page is made from: artefacts as plain arrays and records, already read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vgyro.board import Board
+from vgyro.dataset import Manifest
+
+Table = Mapping[str, np.ndarray]
+Record = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What a figure of metrics.parquet is called, its unit and what it means."""
+
+    title: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Value:
+    """One row of metrics.parquet."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    note: str
+
+    @property
+    def known(self) -> bool:
+        return math.isfinite(self.value)
+
+
+@dataclass(frozen=True)
+class ArrayPart:
+    """One array in one recording.
+
+    gyros      : names, in the board's order
+    tables     : correlation, allan, spectrum, metrics, methods, crosscheck: columns as arrays; absent ones are missing
+    volatility : definition → arch_lm, garch, dcc, weights
+    """
+
+    recording: str
+    axis: str
+    gyros: tuple[str, ...]
+    tables: Mapping[str, Table]
+    volatility: Mapping[str, Mapping[str, Table]]
+
+    @property
+    def anchor(self) -> str:
+        return f"{self.recording}-{self.axis}"
+
+    def values(self) -> dict[tuple[str, str], dict[str, Value]]:
+        """(method or gyro, definition) → metric → figure, in the order of the table."""
+        table = self.tables.get("metrics", {})
+        found: dict[tuple[str, str], dict[str, Value]] = {}
+        for row in rows_of(table):
+            value = Value(
+                float(row["value"]), float(row["low"]), float(row["high"]), str(row["unit"]), str(row["note"])
+            )
+            found.setdefault((str(row["method"]), str(row["definition"])), {})[str(row["metric"])] = value
+        return found
+
+    def methods(self) -> list[dict[str, Any]]:
+        """Rows of methods.parquet."""
+        return list(rows_of(self.tables.get("methods", {})))
+
+
+@dataclass(frozen=True)
+class RecordingPart:
+    """One recording. rates : columns of rates.parquet, None where there are none;  arrays : one an axis"""
+
+    name: str
+    kind: str
+    integrity: Record
+    rates: Table | None = None
+    arrays: tuple[ArrayPart, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        return self.integrity.get("status") != "refused"
+
+
+@dataclass(frozen=True)
+class DatasetPart:
+    """Everything that the page of a data set shows. noise : axis → noise/<axis>.json;  sources : path → metadata"""
+
+    name: str
+    manifest: Manifest
+    board: Board
+    recordings: tuple[RecordingPart, ...]
+    calibration: Record
+    noise: Mapping[str, Record] = field(default_factory=dict)
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    options: Record = field(default_factory=dict)
+    sources: Mapping[str, Record] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        return self.manifest.title or self.name
+
+    @property
+    def arrays(self) -> list[ArrayPart]:
+        return [array for recording in self.recordings for array in recording.arrays]
+
+    def recording(self, name: str) -> RecordingPart:
+        return next(recording for recording in self.recordings if recording.name == name)
+
+
+def rows_of(table: Table) -> Iterator[dict[str, Any]]:
+    """A table row by row."""
+    names = list(table)
+    for values in zip(*(table[name] for name in names), strict=True):
+        yield dict(zip(names, values, strict=True))
+
+
+def chosen(table: Table, mask: np.ndarray) -> dict[str, np.ndarray]:
+    """The rows of a table where `mask` is true."""
+    return {name: column[mask] for name, column in table.items()}

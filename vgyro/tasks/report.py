@@ -1,0 +1,125 @@
+"""Report: the page of a data set and its line in the overview, laid out from the artefacts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from vgyro.board import Board
+from vgyro.dataset import Manifest
+from vgyro.metrics.figures import FIGURES
+from vgyro.report.dataset_page import headline, render_dataset
+from vgyro.report.model import ArrayPart, DatasetPart, Figure, Record, RecordingPart, Table
+from vgyro.storage.tables import read_columns, read_json, read_metadata, write_json, write_text
+from vgyro.tasks.common import Task, run_task
+
+# Long, and drawn nowhere: the figures of the fused rates are in allan, spectrum and metrics.
+NOT_READ = ("fused",)
+
+
+class Place(NamedTuple):
+    """Where an artefact belongs. axis, definition : empty where the artefact is above them;  table : rates, garch, …"""
+
+    recording: str
+    axis: str
+    definition: str
+    table: str
+
+
+def place_of(path: Path, dataset: str) -> Place:
+    """Read results/<dataset>/<recording>[/<axis>[/<definition>]]/<table>.parquet.  raises : ValueError"""
+    parts = path.parts
+    if dataset not in parts[:-1]:
+        raise ValueError(f"{path} is not an artefact of the data set {dataset!r}")
+    first = parts.index(dataset) + 1
+    folders = parts[first:-1]
+    if not 1 <= len(folders) <= 3:
+        raise ValueError(f"{path} is not at results/<dataset>/<recording>[/<axis>[/<definition>]]")
+    recording, axis, definition = (*folders, "", "")[:3]
+    return Place(recording, axis, definition, path.stem)
+
+
+def main(task: Task) -> None:
+    """Read all artefacts of a data set, write page (HTML) and headline (JSON).
+
+    inputs  : calibration; integrity, one a recording in the manifest's order; noise; artefacts, every table
+    options : dataset, manifest, board, analysis
+    """
+    dataset = read_dataset_part(task)
+    write_text(task.output("page"), render_dataset(dataset))
+    write_json(task.output("headline"), headline(dataset))
+
+
+def read_dataset_part(task: Task) -> DatasetPart:
+    """All artefacts of a data set, each in its place."""
+    name = task.options["dataset"]
+    manifest = Manifest.model_validate(task.options["manifest"])
+    board = Board.model_validate(task.options["board"])
+    placed = {place_of(path, name): path for path in task.inputs.get("artefacts", [])}
+    recordings = tuple(
+        RecordingPart(
+            recording.name,
+            recording.kind,
+            read_json(path),
+            read_rates(placed, recording.name, board),
+            read_arrays(placed, recording.name, board),
+        )
+        for recording, path in zip(manifest.recordings, task.inputs["integrity"], strict=True)
+    )
+    return DatasetPart(
+        name,
+        manifest,
+        board,
+        recordings,
+        read_json(task.input("calibration")),
+        {path.stem: read_json(path) for path in task.inputs.get("noise", [])},
+        {key: Figure(figure.title, figure.unit, figure.meaning) for key, figure in FIGURES.items()},
+        task.options.get("analysis", {}),
+        read_sources(task, placed),
+    )
+
+
+def read_rates(placed: dict[Place, Path], recording: str, board: Board) -> Table | None:
+    """Columns of rates.parquet that are drawn; None where the recording has none."""
+    path = placed.get(Place(recording, "", "", "rates"))
+    if path is None:
+        return None
+    known = read_metadata(path)["units"]
+    gyros = {gyro.name for gyro in board.gyros}
+    drawn = [
+        name for name in known if name in gyros or name in {"time", "at_rest", "reference"} or name.startswith("temp_")
+    ]
+    return read_columns(path, drawn)
+
+
+def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tuple[ArrayPart, ...]:
+    """The arrays of a recording that have artefacts, in the board's order."""
+    arrays = []
+    for axis in board.axes:
+        tables: dict[str, Table] = {}
+        volatility: dict[str, dict[str, Table]] = {}
+        for place, path in placed.items():
+            if (place.recording, place.axis) != (recording, axis) or place.table in NOT_READ:
+                continue
+            if place.definition:
+                volatility.setdefault(place.definition, {})[place.table] = read_columns(path)
+            else:
+                tables[place.table] = read_columns(path)
+        if tables:
+            gyros = tuple(gyro.name for gyro in board.array(axis))
+            arrays.append(ArrayPart(recording, axis, gyros, tables, volatility))
+    return tuple(arrays)
+
+
+def read_sources(task: Task, placed: dict[Place, Path]) -> dict[str, Record]:
+    """Path from the data set's folder → metadata of each artefact."""
+    dataset = task.options["dataset"]
+    sources: dict[str, Record] = {}
+    for path in placed.values():
+        start = path.parts.index(dataset) + 1
+        sources["/".join(path.parts[start:])] = read_metadata(path)
+    return sources
+
+
+if __name__ == "__main__":
+    run_task(main)
