@@ -8,10 +8,13 @@ from vgyro.metrics.bootstrap import Resampled, Units, block_length, make_units, 
 from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, model_deviation, noise_coefficients
 from vgyro.metrics.correlation import Correlation, correlation_matrix
 from vgyro.metrics.dynamic import DynamicErrors, dynamic_errors
+from vgyro.metrics.dynamic_figures import dynamic_figures
 from vgyro.metrics.figures import FIGURES, Figure, Reading
 from vgyro.metrics.improvement import improvement_factor, improvement_of_deviation
+from vgyro.metrics.pairs import noise_from_differences
 from vgyro.metrics.readings import moments, paper_readings
 from vgyro.metrics.spectrum import Density, Spectrum, flat_band, noise_density, spectral_density, thinned
+from vgyro.metrics.static_figures import LowPass, StaticFigures, static_figures, without_means
 
 __all__ = [
     "FIGURES",
@@ -21,16 +24,19 @@ __all__ = [
     "Density",
     "DynamicErrors",
     "Figure",
+    "LowPass",
     "NoiseCoefficients",
     "Reading",
     "Resampled",
     "Spectrum",
+    "StaticFigures",
     "Units",
     "allan_deviation",
     "averaging_factors",
     "block_length",
     "correlation_matrix",
     "dynamic_errors",
+    "dynamic_figures",
     "flat_band",
     "improvement_factor",
     "improvement_of_deviation",
@@ -39,9 +45,12 @@ __all__ = [
     "moments",
     "noise_coefficients",
     "noise_density",
+    "noise_from_differences",
     "paper_readings",
     "read_curve",
     "resample",
     "spectral_density",
+    "static_figures",
     "thinned",
+    "without_means",
 ]

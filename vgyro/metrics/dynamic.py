@@ -4,35 +4,50 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 MOST_DELAY_S = 1.0
 NEWTON_STEPS = 8
 STILL = 1e-9
+SMALL_STEP_S = 1e-9
 
 
 @dataclass(frozen=True)
 class DynamicErrors:
-    """error_mean, error_sigma, error_sigma_aligned, error_sigma_scaled, amplitude deg/s; delay s; gain.
+    """Errors of one series; all but the first two are NaN where the reference does not change, and `note` says so.
 
-    error [E], start : rate - reference over the samples used and the index of each, for intervals
-    The last five are NaN where the reference does not change; `note` says so.
+    error_mean, error_sigma : mean and standard deviation of rate - reference, deg/s
+    error_sigma_aligned     : the same after shifting the reference by the delay
+    error_sigma_scaled      : about offset + gain · shifted reference
+    amplitude deg/s, delay s, gain : of the fit
+    aligned, scaled, shifted, slope, inner_segment [I] : errors after alignment, the shifted reference (deg/s) and its
+        derivative (deg/s²), number of the stretch; the ends of the stretches are left out
     """
 
     error_mean: float
     error_sigma: float
-    error_sigma_aligned: float
-    error_sigma_scaled: float
-    amplitude: float
-    delay: float
-    gain: float
-    error: np.ndarray
-    aligned: np.ndarray
-    scaled: np.ndarray
-    used: np.ndarray
+    error_sigma_aligned: float = math.nan
+    error_sigma_scaled: float = math.nan
+    amplitude: float = math.nan
+    delay: float = math.nan
+    gain: float = math.nan
+    aligned: np.ndarray = field(default_factory=lambda: np.empty(0))
+    scaled: np.ndarray = field(default_factory=lambda: np.empty(0))
+    shifted: np.ndarray = field(default_factory=lambda: np.empty(0))
+    slope: np.ndarray = field(default_factory=lambda: np.empty(0))
+    inner_segment: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     note: str = ""
+
+
+@dataclass(frozen=True)
+class _Alignment:
+    delay: float
+    offset: float
+    gain: float
+    shifted: np.ndarray
+    slope: np.ndarray
 
 
 def dynamic_errors(
@@ -57,32 +72,26 @@ def dynamic_errors(
     rate, reference = np.asarray(rate, dtype=float), np.asarray(reference, dtype=float)
     used = np.isfinite(rate) & np.isfinite(reference)
     error = (rate - reference)[used]
+    mean = float(error.mean()) if error.size else math.nan
+    sigma = float(error.std(ddof=1)) if error.size > 1 else math.nan
     if error.size < 2:
-        return _unaligned(error, used, "fewer than 2 samples with a reference")
+        return DynamicErrors(mean, sigma, note="fewer than 2 samples with a reference")
     swing = float(np.std(reference[used]))
     if swing <= STILL * max(float(np.max(np.abs(reference[used]))), 1.0):
-        return _unaligned(error, used, "the reference does not change: no delay, gain or amplitude")
-    runs = _runs(used, segment)
+        return DynamicErrors(mean, sigma, note="the reference does not change: no delay, gain or amplitude")
     margin = max(round(most_delay_s * rate_hz), 1)
-    runs = [run for run in runs if run.stop - run.start > 4 * margin]
+    runs = [run for run in _runs(used, segment) if run.stop - run.start > 4 * margin]
     if not runs:
-        return _unaligned(error, used, f"no gap-free stretch is longer than {4 * most_delay_s:g} s")
+        return DynamicErrors(mean, sigma, note=f"no gap-free stretch is longer than {4 * most_delay_s:g} s")
     lag = _coarse_lag(rate, reference, runs, margin)
-    delay, offset, gain, shifted, inner = _refine(rate, reference, runs, margin, lag / rate_hz, rate_hz)
-    measured = rate[inner]
-    aligned, scaled = measured - shifted, measured - offset - gain * shifted
+    inner = np.concatenate([np.arange(run.start + margin, run.stop - margin) for run in runs])
+    number = np.concatenate([np.full(run.stop - run.start - 2 * margin, index) for index, run in enumerate(runs)])
+    fit = _align(rate[inner], reference, runs, margin, lag / rate_hz, rate_hz)
+    aligned, scaled = rate[inner] - fit.shifted, rate[inner] - fit.offset - fit.gain * fit.shifted
     return DynamicErrors(
-        float(error.mean()), float(error.std(ddof=1)), float(aligned.std(ddof=1)), float(scaled.std(ddof=1)),
-        float(gain * math.sqrt(2) * swing), delay, gain, error, aligned, scaled, used,
+        mean, sigma, float(aligned.std(ddof=1)), float(scaled.std(ddof=1)), float(fit.gain * math.sqrt(2) * swing),
+        fit.delay, fit.gain, aligned, scaled, fit.shifted, fit.slope, number,
     )  # fmt: skip
-
-
-def _unaligned(error: np.ndarray, used: np.ndarray, note: str) -> DynamicErrors:
-    nothing = math.nan
-    mean = float(error.mean()) if error.size else nothing
-    sigma = float(error.std(ddof=1)) if error.size > 1 else nothing
-    empty = np.empty(0)
-    return DynamicErrors(mean, sigma, nothing, nothing, nothing, nothing, nothing, error, empty, empty, used, note)
 
 
 def _runs(used: np.ndarray, segment: np.ndarray | None) -> list[slice]:
@@ -114,35 +123,36 @@ def _coarse_lag(rate: np.ndarray, reference: np.ndarray, runs: list[slice], marg
     return margin - int(np.argmax(products / np.sqrt(spread)))
 
 
-def _refine(
-    rate: np.ndarray, reference: np.ndarray, runs: list[slice], margin: int, delay: float, rate_hz: float
-) -> tuple[float, float, float, np.ndarray, np.ndarray]:
+def _align(
+    measured: np.ndarray, reference: np.ndarray, runs: list[slice], margin: int, delay: float, rate_hz: float
+) -> _Alignment:
+    """Least squares of measured [I] = offset + gain · reference(t - delay), by Gauss-Newton from a delay, s."""
     from scipy.interpolate import CubicSpline
 
     splines = [CubicSpline(np.arange(run.stop - run.start), reference[run]) for run in runs]
     positions = [np.arange(margin, run.stop - run.start - margin, dtype=float) for run in runs]
-    inner = np.concatenate([np.arange(run.start + margin, run.stop - margin) for run in runs])
-    measured = rate[inner]
     limit = margin / rate_hz
 
-    def shifted(delay_s: float, derivative: int) -> np.ndarray:
-        moved = [spline(at - delay_s * rate_hz, derivative) for spline, at in zip(splines, positions, strict=True)]
-        return np.concatenate(moved) * rate_hz**derivative
+    def moved(delay_s: float, derivative: int) -> np.ndarray:
+        parts = [spline(at - delay_s * rate_hz, derivative) for spline, at in zip(splines, positions, strict=True)]
+        return np.concatenate(parts) * rate_hz**derivative
 
     best = (math.inf, delay, 0.0, 1.0)
     for _ in range(NEWTON_STEPS):
-        now = shifted(delay, 0)
-        design = np.column_stack([np.ones_like(now), now])
+        shifted = moved(delay, 0)
+        design = np.column_stack([np.ones_like(shifted), shifted])
         (offset, gain), *_ = np.linalg.lstsq(design, measured, rcond=None)
         left = measured - design @ (offset, gain)
         cost = float(left @ left)
         if cost < best[0]:
             best = (cost, delay, float(offset), float(gain))
-        slope = -gain * shifted(delay, 1)
+        slope = -gain * moved(delay, 1)
         slope -= design @ np.linalg.lstsq(design, slope, rcond=None)[0]
+        if not slope.any():
+            break
         step = float(slope @ left / (slope @ slope))
         delay = float(np.clip(delay + step, -limit, limit))
-        if abs(step) < 1e-9:
+        if abs(step) < SMALL_STEP_S:
             break
     _, delay, offset, gain = best
-    return delay, offset, gain, shifted(delay, 0), inner
+    return _Alignment(delay, offset, gain, moved(delay, 0), moved(delay, 1))

@@ -9,6 +9,7 @@ import numpy as np
 from vgyro.metrics.figures import Reading
 
 NOT_SIGNIFICANT = "not significant"
+ROUNDING = 1e-9
 
 
 def improvement_factor(
@@ -61,4 +62,4 @@ def improvement_of_deviation(
 
 
 def _note(low: float, high: float) -> str:
-    return NOT_SIGNIFICANT if low <= 1 <= high else ""
+    return NOT_SIGNIFICANT if low <= 1 + ROUNDING and high >= 1 - ROUNDING else ""

@@ -1,0 +1,128 @@
+"""Noise: white noise, random walk and correlation of the gyros of one axis, which the filters are designed from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vgyro import units
+from vgyro.board import Board
+from vgyro.config import MetricsOptions
+from vgyro.metrics import (
+    Coefficient,
+    NoiseCoefficients,
+    allan_deviation,
+    correlation_matrix,
+    noise_coefficients,
+    noise_from_differences,
+    without_means,
+)
+from vgyro.storage.tables import write_json
+from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.rates_file import ArrayFile, read_array
+
+ENOUGH_REST_S = 10.0
+
+
+@dataclass(frozen=True)
+class ArrayNoiseRecord:
+    """What is written: N deg/s/√Hz (two-sided) and K deg/s/√s with limits, correlation [N, N], and how it was found."""
+
+    method: str
+    seconds: float
+    coefficients: list[NoiseCoefficients]
+    correlation: np.ndarray
+
+
+def main(task: Task) -> None:
+    """inputs : rates (of the recording to take it from);  outputs : noise;  options : axis, board, analysis.metrics"""
+    options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
+    engine = task.options["analysis"].get("engine", "reference")
+    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
+    path = task.inputs["rates"][0]
+    array = read_array(path, gyros, task.options["axis"])
+    at_rest = array.at_rest.sum() / array.rate_hz >= ENOUGH_REST_S
+    found = noise_at_rest(array, options, engine) if at_rest else noise_in_motion(array, engine)
+    write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
+
+
+def noise_at_rest(array: ArrayFile, options: MetricsOptions, engine: str) -> ArrayNoiseRecord:
+    """From the samples at rest; each stretch's own mean removed."""
+    segment = array.rest_segment()
+    rate = without_means(array.rate[array.at_rest], segment)
+    fits = []
+    for column in range(rate.shape[1]):
+        curve = allan_deviation(
+            rate[:, column],
+            array.rate_hz,
+            None,
+            segment,
+            options.confidence,
+            engine,
+            per_octave=options.taus_per_octave,
+        )
+        fits.append(noise_coefficients(curve, replicates=options.bootstrap, seed=options.seed))
+    correlation = correlation_matrix(rate, array.rate_hz, segment, options.confidence).value
+    return ArrayNoiseRecord("samples at rest", len(rate) / array.rate_hz, fits, correlation)
+
+
+def noise_in_motion(array: ArrayFile, engine: str) -> ArrayNoiseRecord:
+    """From the differences between the gyros, in which the motion cancels; correlation is then not known."""
+    number = array.rate.shape[1]
+    if len(array.rate) >= 3:
+        n, k = noise_from_differences(array.rate, array.rate_hz, array.segment, engine)
+    else:
+        n, k = np.full(number, math.nan), np.full(number, math.nan)
+    nothing = Coefficient(math.nan, math.nan, math.nan)
+    fits = [
+        NoiseCoefficients(
+            Coefficient(a, math.nan, math.nan), nothing, Coefficient(b, math.nan, math.nan), math.nan, math.nan
+        )
+        for a, b in zip(n.tolist(), k.tolist(), strict=True)
+    ]
+    method = "differences between the gyros, no rest long enough; their correlation is taken as none"
+    return ArrayNoiseRecord(method, len(array.rate) / array.rate_hz, fits, np.eye(number))
+
+
+def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: str) -> dict[str, Any]:
+    """JSON: arw and rrw by gyro; where K was not found its upper limit stands in, and rrw_source says so."""
+    correlation = np.where(np.isnan(found.correlation), np.eye(len(gyros)), found.correlation)
+    fits = dict(zip(gyros, found.coefficients, strict=True))
+    rrw = {gyro: _usable_rrw(fit) for gyro, fit in fits.items()}
+    return {
+        "axis": axis,
+        "recording": recording,
+        "method": found.method,
+        "seconds": found.seconds,
+        "gyros": gyros,
+        "units": {"arw": "deg/s/√Hz, two-sided", "rrw": "deg/s/√s", "bias_instability": "deg/s"},
+        "arw": {gyro: _number(fit.N.value) for gyro, fit in fits.items()},
+        "arw_low": {gyro: _number(fit.N.low) for gyro, fit in fits.items()},
+        "arw_high": {gyro: _number(fit.N.high) for gyro, fit in fits.items()},
+        "arw_deg_rt_h": {gyro: _number(units.arw_deg_rt_h(fit.N.value)) for gyro, fit in fits.items()},
+        "rrw": {gyro: _number(value) for gyro, (value, _) in rrw.items()},
+        "rrw_source": {gyro: source for gyro, (_, source) in rrw.items()},
+        "rrw_low": {gyro: _number(fit.K.low) for gyro, fit in fits.items()},
+        "rrw_high": {gyro: _number(fit.K.high) for gyro, fit in fits.items()},
+        "bias_instability": {gyro: _number(fit.B.value) for gyro, fit in fits.items()},
+        "correlation": [[float(value) for value in row] for row in correlation],
+    }
+
+
+def _usable_rrw(fit: NoiseCoefficients) -> tuple[float, str]:
+    if fit.K.value > 0:
+        return fit.K.value, "fitted"
+    if fit.K.high > 0:
+        return fit.K.high, "upper limit: no random walk was found"
+    return fit.K.value, "none" if fit.K.value == 0 else "not known"
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+if __name__ == "__main__":
+    run_task(main)
