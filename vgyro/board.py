@@ -11,7 +11,8 @@ from vgyro.validation import StrictModel, parse_model
 
 FieldType = Literal["u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u64", "i64", "f32", "f64"]
 TYPE_BYTES: dict[str, int] = {
-    "u8": 1, "i8": 1, "u16": 2, "i16": 2, "u24": 3, "i24": 3, "u32": 4, "i32": 4, "u64": 8, "i64": 8, "f32": 4, "f64": 8,
+    "u8": 1, "i8": 1, "u16": 2, "i16": 2, "u24": 3, "i24": 3, "u32": 4, "i32": 4, "u64": 8, "i64": 8,
+    "f32": 4, "f64": 8,
 }  # fmt: skip
 ByteOrder = Literal["big", "little"]
 
@@ -35,7 +36,7 @@ class ChannelField(StrictModel):
 class Checksum(StrictModel):
     """family `crc` takes width, polynomial, init, reflected, xor_out; `sum` adds bytes modulo 2^width; `xor` for text.
 
-    span : bytes [first, last) that are covered;  at : offset of the stored value (null: the frame's total must be `equals`)
+    span : bytes [first, last) that are covered;  at : offset of the stored value (null: the total must be `equals`)
     pad_to : zero bytes are added to a multiple of this before the CRC is taken
     """
 

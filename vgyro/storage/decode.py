@@ -1,0 +1,46 @@
+"""Recordings, dumps or archived logs → frames: integer counts on one clock, and the record of what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from vgyro.board import Board
+from vgyro.config import IntegrityOptions
+from vgyro.dataset import Recording
+from vgyro.storage.dumps import CHUNK_BYTES, DumpReader
+from vgyro.storage.frames import Frames, Reader, gather
+from vgyro.storage.inputs import BOARDS
+from vgyro.storage.parquetlog import LogReader
+
+
+def decode_dump(paths: Sequence[str | Path], board: Board, options: IntegrityOptions | None = None) -> Frames:
+    """Decode the dumps of one recording, in order, as one stream; plain, .gz or .zst.
+
+    returns : Frames with counts {channel: [T]}, counter [T], time [T] s, segment [T] and the integrity record
+    raises  : DataError for a missing or empty file, a file of another board, too few good frames
+    """
+    paths = [paths] if isinstance(paths, str | Path) else list(paths)
+    reader = DumpReader(paths, board, board.rate_hz, options or IntegrityOptions())
+    frames = gather(reader, board)
+    return frames._replace(integrity=reader.integrity)
+
+
+def open_recording(
+    paths: Sequence[str | Path],
+    recording: Recording,
+    board: Board,
+    options: IntegrityOptions,
+    chunk_bytes: int = CHUNK_BYTES,
+    boards: Path = BOARDS,
+) -> Reader:
+    """Stream a recording of dumps or Parquet logs.
+
+    returns : an iterable of Frames; its `integrity` is set when the last chunk is read
+    raises  : DataError for a missing or empty file, a wrong column; while it is read, Refused
+    boards  : folder of the boards that are tried when this one does not fit
+    """
+    rate_hz = recording.rate_hz or board.rate_hz
+    if recording.parquet is not None:
+        return LogReader(paths, recording.parquet, board, rate_hz, options)
+    return DumpReader(paths, board, rate_hz, options, chunk_bytes, boards)

@@ -1,0 +1,178 @@
+"""Serial dumps → frames: scan → clock → frames, with a ledger of all that is not a good frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from vgyro.board import Board
+from vgyro.config import IntegrityOptions
+from vgyro.storage.clock import LOST, PAUSE, Clock, Timed
+from vgyro.storage.frames import Frames, channel_watches
+from vgyro.storage.inputs import BOARDS
+from vgyro.storage.integrity import Damage, FileRecord, Gap, Integrity, Ledger
+from vgyro.storage.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Found, Tail
+from vgyro.storage.sniff import Probe, boards_that_fit, probe, scanner_of
+from vgyro.storage.sources import Sources, open_sources
+from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
+
+CHUNK_BYTES = 1 << 22
+
+SEEN = ("checksum", "marked invalid by the board", "truncated at the end")
+CAUSES = {NO_SYNC: "no sync", BAD_CHECKSUM: "checksum", INVALID: "marked invalid by the board"}
+
+
+@dataclass
+class DumpReader:
+    """Dumps of one recording, streamed: scan → clock → frames, with a ledger of all that is not a good frame."""
+
+    paths: Sequence[str | Path]
+    board: Board
+    rate_hz: float
+    options: IntegrityOptions
+    chunk_bytes: int = CHUNK_BYTES
+    boards: Path = BOARDS
+    integrity: Integrity | None = None
+
+    def __post_init__(self) -> None:
+        self.board.layout  # noqa: B018  a board without frame is refused here
+        self._sources = open_sources(self.paths)
+        self._ledger = Ledger()
+        self._good = self._repeated = 0
+        self._stop = 0  # end of the last good frame
+        self._time: float | None = None  # of the last kept frame
+        self._segment = 0
+        self._watches = channel_watches(self.board)
+
+    def __iter__(self) -> Iterator[Frames]:
+        """Decode chunk by chunk.  raises : Refused"""
+        seen = probe(self._sources, self.board)
+        self._probe = seen
+        scanner = scanner_of(self.board, seen.typical_length)
+        self._clock = Clock(self.board, self.rate_hz, seen.period_ticks, seen.typical_length)
+        self._length = seen.typical_length
+        for block in self._sources.chunks(self.chunk_bytes):
+            yield from self._chunk(scanner.feed(block))
+        yield from self._chunk(scanner.feed(b"", last=True))
+        self._note_tail(scanner.tail())
+        self._conclude()
+
+    def _chunk(self, found: Found) -> Iterator[Frames]:
+        if not len(found.start):
+            return
+        timed = self._clock.feed(found)
+        self._good += len(timed.counter)
+        self._repeated += timed.repeated
+        self._note(found, timed)
+        if not len(timed.counter):
+            return
+        self._time, self._segment = float(timed.time[-1]), int(timed.segment[-1])
+        for name, watch in self._watches.items():
+            watch.feed(timed.found.channels[name], timed.time)
+        yield Frames(timed.found.channels, timed.counter, timed.time, timed.segment)
+
+    def _note(self, found: Found, timed: Timed) -> None:
+        """Damaged bytes before each frame, and gaps in time."""
+        before = np.insert(found.stop[:-1], 0, self._stop)
+        jumps = {int(timed.rows[jump.row]): jump for jump in timed.jumps}
+        holes = np.flatnonzero(found.start > before).tolist()
+        for row in sorted({*holes, *jumps}):
+            start, stop = int(before[row]), int(found.start[row])
+            jump = jumps.get(row)
+            lost = (jump.lost or 0) if jump else 0
+            if stop > start:
+                first = self._time is None and row == 0
+                self._note_damage(start, stop, lost, self._cause(start, stop, int(found.damage[row])), estimate=first)
+            if jump:
+                last = float(timed.time[jump.row - 1]) if jump.row else self._time or 0.0
+                due = last + 1 / self.rate_hz
+                duration = float(timed.time[jump.row]) - due if jump.known else None
+                cause = self._gap_cause(jump.kind, start, stop)
+                self._ledger.add_gap(Gap(due, duration, jump.lost, cause, jump.ambiguous))
+        self._stop = int(found.stop[-1])
+
+    def _note_tail(self, tail: Tail) -> None:
+        if tail.stop > tail.start:
+            cause = self._cause(tail.start, tail.stop, tail.damage)
+            if tail.broken_off and tail.stop - tail.start < 2 * self._length:
+                cause = "truncated at the end"
+            self._note_damage(tail.start, tail.stop, 0, cause, estimate=True)
+
+    def _note_damage(self, start: int, stop: int, lost: int, cause: str, estimate: bool) -> None:
+        """Write damaged bytes down, a file at a time; the frames are lost in the file that holds most of the bytes."""
+        frames = max(int(cause in SEEN), round((stop - start) / self._length))
+        self._ledger.bad += frames
+        if estimate:
+            lost = frames if cause in SEEN else 0
+        borders = [start, *(place for place in self._sources.borders() if start < place < stop), stop]
+        parts = list(pairwise(borders))
+        largest = max(parts, key=lambda part: part[1] - part[0])
+        for part in parts:
+            file, first = self._sources.place(part[0])
+            share = lost if part == largest else 0
+            self._ledger.add_damage(Damage(file.name, first, first + part[1] - part[0], share, cause))
+
+    def _cause(self, start: int, stop: int, damage: int) -> str:
+        begins = start in (0, *self._sources.borders())
+        if begins and (damage == NO_SYNC or stop - start < self._length):
+            return "leading bytes"
+        return CAUSES[damage]
+
+    def _gap_cause(self, kind: str, start: int, stop: int) -> str:
+        if kind == PAUSE:
+            return "the counter is in step, the clock is not: the board paused"
+        if kind != LOST:
+            return "the counter or clock restarted"
+        if any(start <= border <= stop for border in self._sources.borders()):
+            return "between two files"
+        return "damaged bytes" if stop > start else "not in the dump"
+
+    def _conclude(self) -> None:
+        where = str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more"
+        outcome = Outcome(
+            board=self.board,
+            values="counts",
+            files=file_records(self._sources),
+            good=self._good,
+            repeated=self._repeated,
+            end_s=self._time,
+            declared_rate_hz=self.rate_hz,
+            measured_rate_hz=self._clock.measured_rate_hz,
+            segments=self._segment + 1 if self._good else 0,
+            still=self._clock.still,
+        )
+        watches = {name: watch.record() for name, watch in self._watches.items()}
+        self.integrity = conclude(outcome, self._ledger, watches, self.options, self._hints(self._probe))
+        refuse_if_needed(self.integrity, self.options, where, self._remedy)
+
+    def _hints(self, seen: Probe) -> list[str]:
+        found = [
+            f"{file.name} breaks off: its compressed data are not complete"
+            for file in self._sources.files
+            if file.cut_short
+        ]
+        counter = self.board.counter
+        if counter and seen.counter_step is not None and seen.counter_step != counter.step:
+            found.append(
+                f"adjacent frames differ by {seen.counter_step} in the counter, where board {self.board.name} says"
+                f" {counter.step}: if nothing is missing, set counter.step: {seen.counter_step} in the board file"
+            )
+        return found
+
+    def _remedy(self) -> str:
+        fits = boards_that_fit(self.paths[0], self.boards, self.board.name)
+        if fits:
+            return f"the file reads as board {' or '.join(fits)}: set `board` in the manifest"
+        hints = self._hints(self._probe)
+        if hints:
+            return hints[-1]
+        return "check that `board` and its frame layout are right, and that the logger stored raw bytes"
+
+
+def file_records(sources: Sources) -> list[FileRecord]:
+    """Name, size and hash of every file."""
+    return [FileRecord(f.name, f.size, f.sha256, f.compression, f.content_bytes) for f in sources.files]

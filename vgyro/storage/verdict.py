@@ -1,0 +1,180 @@
+"""Is a recording good, suspect or to be refused? The reasons, as sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from vgyro.board import Board
+from vgyro.config import IntegrityOptions
+from vgyro.errors import DataError
+from vgyro.storage.integrity import (
+    ChannelRecord,
+    FileRecord,
+    FrameCount,
+    Integrity,
+    Ledger,
+    Refused,
+    good_share,
+    listed,
+    percent,
+)
+
+SUSPECT_SHARE = 0.99
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a reader knows at the end of a recording. end_s: time of the last frame, s; None without frames."""
+
+    board: Board
+    values: Literal["counts", "rates"]
+    files: list[FileRecord]
+    good: int
+    repeated: int
+    end_s: float | None
+    declared_rate_hz: float
+    measured_rate_hz: float | None
+    segments: int
+    still: int = 0
+
+
+def conclude(
+    outcome: Outcome,
+    ledger: Ledger,
+    channels: dict[str, ChannelRecord],
+    options: IntegrityOptions,
+    hints: list[str],
+) -> Integrity:
+    """The integrity record, good or suspect; see refuse_if_needed."""
+    board, declared, measured = outcome.board, outcome.declared_rate_hz, outcome.measured_rate_hz
+    share = good_share(outcome.good, ledger.bad, ledger.lost)
+    frames = FrameCount(outcome.good, ledger.bad, ledger.lost, outcome.repeated, share)
+    rate_note, contradicts = rate_check(board, declared, measured, options)
+    reasons = [f"{rate_note}: the measured rate is used"] if contradicts else []
+    reasons += suspicions(board, frames, ledger, channels, options)
+    rate = measured if contradicts and measured is not None else declared
+    return Integrity(
+        board=board.name,
+        status="suspect" if reasons else "good",
+        reasons=reasons,
+        warnings=notes(board, ledger, outcome.still) + hints,
+        values=outcome.values,
+        files=outcome.files,
+        frames=frames,
+        duration_s=0.0 if outcome.end_s is None else outcome.end_s + 1 / rate,
+        rate_hz=rate,
+        declared_rate_hz=declared,
+        measured_rate_hz=measured,
+        rate_note=rate_note,
+        segments=outcome.segments,
+        restarts=ledger.restarts,
+        gaps=ledger.gaps,
+        gaps_not_listed=ledger.more_gaps,
+        damage=ledger.damage,
+        damage_not_listed=ledger.more_damage,
+        channels=channels,
+    )
+
+
+def refuse_if_needed(record: Integrity, options: IntegrityOptions, where: str, remedy: Callable[[], str]) -> None:
+    """raises : Refused if there is no good frame, or too small a share of them"""
+    frames = record.frames
+    if frames.good == 0:
+        size = sum(file.content_bytes for file in record.files)
+        what = f"no good frame of board {record.board} in {size} bytes, from byte 0 to the end"
+    elif frames.good_share < options.min_good_share:
+        first = f", from byte {record.damage[0].start} of {record.damage[0].file} on" if record.damage else ""
+        counts = f"{frames.good} good, {frames.lost} lost, {frames.bad} damaged{first}"
+        limit = f"integrity.min_good_share = {percent(options.min_good_share)}"
+        what = f"only {percent(frames.good_share)} of the frames are good ({counts}), less than {limit}"
+    else:
+        return
+    message = Refused(record, what, where, remedy())
+    message.integrity = replace(record, status="refused", reasons=[str(message), *record.reasons])
+    raise message
+
+
+def rate_check(board: Board, declared: float, measured: float | None, options: IntegrityOptions) -> tuple[str, bool]:
+    """A sentence on declared and measured rate, and whether they contradict each other."""
+    if measured is None:
+        why = "it holds no time stamps" if board.counter else "it holds neither time stamps nor a frame counter"
+        return (
+            f"the rate of {declared:g} Hz is as declared and cannot be checked from the recording alone: {why}",
+            False,
+        )
+    error = measured / declared - 1
+    text = f"measured {measured:.6g} Hz, declared {declared:g} Hz ({100 * error:+.2g} %)"
+    return text, abs(error) > options.max_rate_error
+
+
+def suspicions(
+    board: Board,
+    frames: FrameCount,
+    ledger: Ledger,
+    channels: dict[str, ChannelRecord],
+    options: IntegrityOptions,
+) -> list[str]:
+    """Reasons to look twice; empty for a good recording."""
+    reasons = []
+    if frames.good_share < SUSPECT_SHARE:
+        counts = f"{frames.good} good, {frames.lost} lost, {frames.bad} damaged"
+        reasons.append(f"only {percent(frames.good_share)} of the frames are good ({counts})")
+    if ledger.restarts:
+        times = "once" if ledger.restarts == 1 else f"{ledger.restarts} times"
+        reasons.append(f"the counter or clock restarted {times}; how long the board was off is not known")
+    gyros = {gyro.field: gyro.name for gyro in board.gyros}
+    clipped = [gyros[name] for name, record in channels.items() if record.clipped_share > options.max_clipped_share]
+    clipped = [name for name in clipped if name]
+    if clipped:
+        limit = percent(options.max_clipped_share)
+        reasons.append(f"more than {limit} of the samples are clipped on {listed(clipped)}")
+    for name, record in channels.items():
+        if name in gyros and record.stuck_duration > options.stuck_s:
+            when = f"from {record.stuck_start:.6g} s on"
+            reasons.append(f"gyro {gyros[name]} repeats one value for {record.stuck_duration:.3g} s, {when}")
+    return reasons
+
+
+def notes(board: Board, ledger: Ledger, still: int) -> list[str]:
+    """What is good to know and makes nothing suspect."""
+    found = []
+    if ledger.ambiguous:
+        what = "whole wraps of the counter" if board.counter else "more frames"
+        if not board.counter and not board.timestamp:
+            found.append(
+                "without counter and time stamp, gaps are as long as the damaged bytes; whole pauses do not show"
+            )
+        else:
+            found.append(f"{ledger.ambiguous} gaps are the shortest that fit; {what} more would fit as well")
+    if still:
+        found.append(f"the counter stood still in {still} frames")
+    if board.frame is not None and board.frame.checksum.family == "none":
+        found.append("the frames carry no checksum: a damaged digit that still reads as a number does not show")
+    return found
+
+
+def unreadable_record(board: Board, rate_hz: float, error: DataError) -> Integrity:
+    """The record of a recording that could not even be opened."""
+    return Integrity(
+        board=board.name,
+        status="refused",
+        reasons=[str(error)],
+        warnings=[],
+        values="counts",
+        files=[],
+        frames=FrameCount(0, 0, 0, 0, 0.0),
+        duration_s=0.0,
+        rate_hz=rate_hz,
+        declared_rate_hz=rate_hz,
+        measured_rate_hz=None,
+        rate_note="not read",
+        segments=0,
+        restarts=0,
+        gaps=[],
+        gaps_not_listed={"entries": 0, "frames_lost": 0},
+        damage=[],
+        damage_not_listed={"entries": 0, "bytes": 0, "frames_lost": 0},
+        channels={},
+    )

@@ -1,0 +1,93 @@
+"""Files of one recording → frames.parquet and integrity.json. A recording that cannot be used is refused, not failed."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from vgyro.board import Board
+from vgyro.config import IntegrityOptions
+from vgyro.dataset import Manifest, Recording
+from vgyro.errors import DataError
+from vgyro.storage.decode import open_recording
+from vgyro.storage.frames import Frames, empty_frames
+from vgyro.storage.integrity import Integrity, Refused
+from vgyro.storage.tables import Provenance, TableWriter, write_json, write_table
+from vgyro.storage.verdict import unreadable_record
+from vgyro.tasks.common import Task, run_task
+
+
+def main(task: Task) -> None:
+    """inputs : files;  outputs : frames, integrity;  options : manifest, board, recording, analysis.integrity
+
+    A refused recording gets an empty table, a record that says why, and one message on stderr; the other recordings
+    go on, and the last rule of the workflow fails.
+    """
+    manifest = Manifest.model_validate(task.options["manifest"])
+    board = Board.model_validate(task.options["board"])
+    recording = manifest.recording(task.options["recording"])
+    options = IntegrityOptions.model_validate(task.options.get("analysis", {}).get("integrity", {}))
+    provenance = _provenance(task)
+    try:
+        record = decode(task.inputs["files"], recording, board, options, task.output("frames"), provenance)
+        for reason in record.reasons:
+            _say(f"{recording.name}: suspect: {reason}")
+    except DataError as error:
+        record = _record_of(error, board, recording)
+        write_table(task.output("frames"), columns_of(empty_frames(board)), "frames", provenance, _extra(record))
+        logging.exception("%s", error)
+        _say(str(error))
+    write_json(task.output("integrity"), {"recording": recording.name, **record.to_json()})
+
+
+def decode(
+    paths: Iterable[Path],
+    recording: Recording,
+    board: Board,
+    options: IntegrityOptions,
+    output: Path,
+    provenance: Provenance,
+) -> Integrity:
+    """Stream a recording into a table of frames.  raises : DataError; then there is no table"""
+    reader = open_recording(list(paths), recording, board, options)
+    with TableWriter(output, "frames", provenance, {"board": board.name}) as writer:
+        for frames in reader:
+            writer.append(columns_of(frames))
+    if reader.integrity is None:
+        raise RuntimeError("the reader ended without a record")
+    return reader.integrity
+
+
+def columns_of(frames: Frames) -> dict[str, Any]:
+    """Columns of frames.parquet."""
+    return {"counter": frames.counter, "time": frames.time, "segment": frames.segment, **frames.counts}
+
+
+def _record_of(error: DataError, board: Board, recording: Recording) -> Integrity:
+    if isinstance(error, Refused):
+        return error.integrity
+    return unreadable_record(board, recording.rate_hz or board.rate_hz, error)
+
+
+def _extra(record: Integrity) -> dict[str, str]:
+    return {"board": record.board}
+
+
+def _provenance(task: Task) -> Provenance:
+    """Hashes of the files that are there: a missing one is a reason to refuse, not to fail; of a folder, its logs'."""
+    files: list[Path] = []
+    for path in task.inputs["files"]:
+        files += sorted(path.rglob("*.parquet")) if path.is_dir() else [path]
+    present = {**task.inputs, "files": [path for path in files if path.is_file()]}
+    return Task(present, task.outputs, task.options, task.code).provenance()
+
+
+def _say(text: str) -> None:
+    print(f"vgyro: {text}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    run_task(main)
