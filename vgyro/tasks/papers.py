@@ -32,6 +32,7 @@ def main(task: Task) -> None:
         board,
         VolatilityOptions.model_validate(analysis.get("volatility", {})),
         MetricsOptions.model_validate(analysis.get("metrics", {})),
+        any(table.select.get("artefact") == "metrics_1hz" for table in paper.tables),
     )
     implied = implied_cells(paper)
     comparisons = [compare(paper, table, evidence, implied) for table in paper.tables]

@@ -15,8 +15,9 @@ from vgyro.dataset import ConstantReference, Manifest
 from vgyro.papers import Evidence, with_single
 from vgyro.papers.series import series_figures, with_extremes
 from vgyro.storage.tables import read_columns
-from vgyro.tasks.volatility_series import sample_rate
-from vgyro.volatility import block_means
+from vgyro.tasks.measure import fused_series
+from vgyro.tasks.rates_file import read_array
+from vgyro.volatility import Series, block_means
 
 Rows = list[dict[str, Any]]
 # 95 % limits of an estimate with this standard error.
@@ -26,11 +27,17 @@ FAULTY, STRETCHES = 4, {"before 1000 s": (0.0, 1000.0), "after 2500 s": (2500.0,
 
 
 def gather(
-    paths: Sequence[Path], manifest: Manifest, board: Board, volatility: VolatilityOptions, metrics: MetricsOptions
+    paths: Sequence[Path],
+    manifest: Manifest,
+    board: Board,
+    volatility: VolatilityOptions,
+    metrics: MetricsOptions,
+    slow_series: bool,
 ) -> Evidence:
     """Evidence of one twin from all its artefacts.
 
     paths : files under …/<recording>/[<axis>/[<definition>/]]<table>.parquet; tables that no cell needs are passed over
+    slow_series : whether the figures of the block means are wanted (L, Table 3)
     """
     gyros = [gyro.name for gyro in board.array(board.axes[0])]
     rows: dict[str, Rows] = {}
@@ -40,7 +47,7 @@ def gather(
             rows.setdefault(path.stem, []).extend(read(path, gyros))
     if "metrics" in rows:
         rows["metrics"] = with_single(with_table_means(rows["metrics"], manifest), gyros)
-    for static in at_rest(paths, manifest):
+    for static in at_rest(paths, manifest) if slow_series else ():
         place = {"recording": static.parts[-3], "axis": static.parts[-2]}
         names, values, stretch, rate_hz = _block_series(static, gyros, volatility)
         figures = series_figures(place, names, len(gyros), values, stretch, rate_hz, metrics)
@@ -131,25 +138,21 @@ def at_rest(paths: Sequence[Path], manifest: Manifest) -> list[Path]:
 
 
 def _block_series(
-    fused: Path, gyros: Sequence[str], volatility: VolatilityOptions
+    fused: Path, gyros: list[str], volatility: VolatilityOptions
 ) -> tuple[list[tuple[str, str]], np.ndarray, np.ndarray, float]:
     """(method, definition) of each column, block means [M, S], stretch [M], rate: single gyros first, then methods.
 
     fused : …/<recording>/<axis>/fused.parquet, with methods.parquet beside it and rates.parquet one folder up
     """
-    rates_path = fused.parents[1] / "rates.parquet"
-    rates = read_columns(rates_path, ["time", "segment", "at_rest", *gyros])
-    rate_hz = sample_rate(rates_path, rates["time"])
-    methods = read_columns(fused.with_name("methods.parquet"), ["method", "definition", "column"])
-    ran = [row for row in zip(*methods.values(), strict=True) if row[2]]
-    block_hz = rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
-    rest = rates["at_rest"].astype(bool)
+    array = read_array(fused.parents[1] / "rates.parquet", gyros, fused.parts[-2])
+    methods = fused_series(read_columns(fused.with_name("methods.parquet")))
+    block_hz = array.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
 
-    def means(column: np.ndarray) -> Any:
-        return block_means(column[:, None], rate_hz, block_hz, rates["segment"], rest, rates["time"])
+    def means(columns: np.ndarray) -> Series:
+        return block_means(columns, array.rate_hz, block_hz, array.segment, array.at_rest, array.time)
 
     # One column at a time: the record of all methods at the full rate is large.
-    series = [means(rates[gyro]) for gyro in gyros]
-    series += [means(read_columns(fused, [column])[column]) for _, _, column in ran]
-    names = [(gyro, "") for gyro in gyros] + [(str(method), str(definition)) for method, definition, _ in ran]
-    return names, np.hstack([found.values for found in series]), series[0].stretch, series[0].rate_hz
+    singles = means(array.rate)
+    virtual = [means(read_columns(fused, [one.column])[one.column][:, None]).values for one in methods]
+    names = [(gyro, "") for gyro in gyros] + [(one.method, one.definition) for one in methods]
+    return names, np.hstack([singles.values, *virtual]), singles.stretch, singles.rate_hz
