@@ -11,14 +11,14 @@ from vgyro.report.tables import Cell, Column, render_table
 CONVENTIONS = (
     ("Allan model", "σ² = 3Q²/τ² + N²/τ + (2 ln2/π)B² + K²τ/3 + R²τ²/2, τ in s, rate in deg/s; overlapping estimator"),
     ("spectrum", "two-sided: N², B²/(2πf), K²/(2πf)²; a one-sided Welch density is √2 larger, and plots show that one"),
-    ("ARW, N", "N [deg/√h] = 60·N [deg/s/√Hz, two-sided]; read at 1 s and fitted are two figures: a low-pass fakes the first"),
+    ("ARW, N", "N [deg/√h] = 60·N [deg/s/√Hz, two-sided]; “read at 1 s” is another figure: a low-pass lowers it"),
     ("RRW, K", "K [deg/h/√h] = 60·K [deg/h/√s]"),
     ("bias instability, B", "flicker coefficient, min σ/0.664 where the curve has a flat floor"),
     ("bias drift", "the papers' name for the minimum of the Allan curve, min σ, given with its τ"),
-    ("improvement factor", "mean of a figure over the single gyros / that of the virtual gyro (Liu et al. 2015, eq. 18)"),
+    ("improvement factor", "mean over the single gyros / figure of the virtual gyro (Liu et al. 2015, eq. 18)"),
     ("intervals", "95 %: chi² with equivalent degrees of freedom for Allan deviations, moving-block bootstrap else"),
     ("gaps", "estimates are made over gap-free stretches; none bridges a gap"),
-    ("bandwidth", "−3 dB and noise-equivalent, one-sided, of the method alone; DC gain 1: a constant rate passes as it is"),
+    ("bandwidth", "−3 dB and noise-equivalent, one-sided, of the method alone; DC gain 1: a constant rate passes"),
 )  # fmt: skip
 
 

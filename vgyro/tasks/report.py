@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from vgyro.tasks.common import Task, run_task
 
 # Long, and drawn nowhere: the figures of the fused rates are in allan, spectrum and metrics.
 NOT_READ = ("fused",)
+RESULTS = "results"
 
 
 class Place(NamedTuple):
@@ -28,15 +30,19 @@ class Place(NamedTuple):
 
 def place_of(path: Path, dataset: str) -> Place:
     """Read results/<dataset>/<recording>[/<axis>[/<definition>]]/<table>.parquet.  raises : ValueError"""
-    parts = path.parts
-    if dataset not in parts[:-1]:
-        raise ValueError(f"{path} is not an artefact of the data set {dataset!r}")
-    first = parts.index(dataset) + 1
-    folders = parts[first:-1]
+    folders = inside(path, dataset).parts[:-1]
     if not 1 <= len(folders) <= 3:
         raise ValueError(f"{path} is not at results/<dataset>/<recording>[/<axis>[/<definition>]]")
     recording, axis, definition = (*folders, "", "")[:3]
     return Place(recording, axis, definition, path.stem)
+
+
+def inside(path: Path, dataset: str) -> Path:
+    """The path from results/<dataset> on.  raises : ValueError if it does not lie there"""
+    pairs = list(itertools.pairwise(path.parts))
+    if (RESULTS, dataset) not in pairs:
+        raise ValueError(f"{path} is not in {RESULTS}/{dataset}")
+    return Path(*path.parts[pairs.index((RESULTS, dataset)) + 2 :])
 
 
 def main(task: Task) -> None:
@@ -116,8 +122,7 @@ def read_sources(task: Task, placed: dict[Place, Path]) -> dict[str, Record]:
     dataset = task.options["dataset"]
     sources: dict[str, Record] = {}
     for path in placed.values():
-        start = path.parts.index(dataset) + 1
-        sources["/".join(path.parts[start:])] = read_metadata(path)
+        sources[inside(path, dataset).as_posix()] = read_metadata(path)
     return sources
 
 

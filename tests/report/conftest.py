@@ -1,0 +1,336 @@
+"""A small data set of artefacts with plausible figures, made without the pipeline: what the pages are tested on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vgyro.storage.tables import Provenance, write_json, write_table
+from vgyro.tasks.common import Task
+
+GYROS = ("g1", "g2", "g3", "g4")
+DATASET = "bench"
+PROVENANCE = Provenance({"rates": "ab" * 32}, "cd" * 32, "ef" * 32)
+NOISE = {"g1": 0.05, "g2": 0.052, "g3": 0.048, "g4": 0.16}
+METHODS = (
+    ("average", "", "Average", True),
+    ("median", "", "Median", True),
+    ("inverse_variance_arw", "", "Inverse variance, ARW", True),
+    ("inverse_variance_rrw", "", "Inverse variance, RRW", True),
+    ("jiang_random_walk", "", "Jiang 2012, random walk", True),
+    ("dcc_in_sample", "level", "DCC weights, in-sample", False),
+    ("dcc_causal", "level", "DCC weights, causal", True),
+    ("dcc_causal", "residual", "DCC weights, causal", True),
+)
+GAIN = {
+    "average": 1.9,
+    "median": 2.4,
+    "inverse_variance_arw": 2.8,
+    "jiang_random_walk": 3.4,
+    "dcc_in_sample": 3.1,
+    "dcc_causal": 2.9,
+}
+
+
+def board() -> dict[str, Any]:
+    names = (*GYROS, "solo")
+    fields = [{"name": name, "type": "i16", "at": 2 + 2 * index} for index, name in enumerate(names)]
+    gyros = [
+        {"name": name, "field": name, "axis": "z" if name == "solo" else "x", "scale": 0.01, "range_deg_s": 300.0}
+        for name in names
+    ]
+    frame = {"kind": "binary", "sync": "EB90", "length": 12, "fields": fields, "checksum": {"family": "none"}}
+    return {"name": "bench", "title": "Bench board <A&B>", "rate_hz": 50.0, "frame": frame, "gyros": gyros}
+
+
+def manifest(simulated: bool = True) -> dict[str, Any]:
+    plateaus = [{"start": 10.0 * k, "stop": 10.0 * k + 8, "rate": rate} for k, rate in enumerate((-100.0, 0.0, 100.0))]
+    recordings = [
+        {"name": "cal", "kind": "calibration", "files": ["cal.bin"], "reference": {"kind": "plateaus", "plateaus": plateaus}, "axis": "x"},
+        {"name": "rest", "kind": "static", "files": ["rest.bin"]},
+        {"name": "sine", "kind": "sinusoid", "files": ["sine.bin"], "axis": "x",
+         "reference": {"kind": "sinusoid", "amplitude": 60.0, "frequency_hz": 0.1}},
+        {"name": "broken", "kind": "static", "files": ["broken.bin"]},
+    ]  # fmt: skip
+    return {"board": "bench", "title": "Bench test", "simulated": simulated, "twin": "demo", "recordings": recordings}
+
+
+def integrity(name: str) -> dict[str, Any]:
+    refused = name == "broken"
+    gaps = [{"start_s": 100.0, "stop_s": 100.5, "lost": 25, "cause": "line noise"}] if name == "rest" else []
+    damage = (
+        [{"file": "rest.bin", "first_byte": 1200, "last_byte": 1260, "cause": "checksum <&>"}] if name == "rest" else []
+    )
+    return {
+        "status": "refused" if refused else "suspect" if name == "rest" else "good",
+        "reasons": ["only 12 % of its frames are good"] if refused else [],
+        "warnings": ["25 frames are lost"] if name == "rest" else [],
+        "files": [{"name": f"{name}.bin", "bytes": 123456, "sha256": "12" * 32}],
+        "frames": {"good": 60_000, "bad": 3, "lost": 25 if gaps else 0, "repeated": 0},
+        "good_share": 0.12 if refused else 0.9995,
+        "damage": damage,
+        "gaps": gaps,
+        "segments": 1 + len(gaps),
+        "channels": {"g2": {"clipped": 17, "stuck": 0}, "g3": {"clipped": 0, "stuck": 1}} if name == "rest" else {},
+        "rate": {"declared_hz": 50.0, "measured_hz": 49.987},
+        "duration_s": 1200.0,
+        "rate_hz": 50.0,
+    }
+
+
+def calibration() -> dict[str, Any]:
+    points = [
+        {"rate": 50.0 * k, "mean_count": 5000.0 * k + 20, "residual_deg_s": 0.002 * (-1) ** k} for k in range(-6, 7)
+    ]
+    measured = {
+        "source": "measured", "scale": 0.0100123, "scale_low": 0.0100119, "scale_high": 0.0100127, "bias": 20.1,
+        "bias_low": 19.8, "bias_high": 20.4, "nonlinearity_ppm": 210.0, "floor_ppm": 160.0, "points": points, "note": "",
+    }  # fmt: skip
+    nominal = {
+        "source": "nominal", "scale": 0.01, "scale_low": None, "scale_high": None, "bias": 0.0, "bias_low": None,
+        "bias_high": None, "nonlinearity_ppm": None, "floor_ppm": None, "points": [],
+        "note": "nominal scale: no calibration recording",
+    }  # fmt: skip
+    return {"gyros": {**dict.fromkeys(GYROS, measured), "solo": nominal}}
+
+
+def build(folder: Path, failed_check: bool = False, simulated: bool = True) -> Task:
+    """Write the artefacts under folder/results; return the report task that reads them."""
+    root = folder / "results" / DATASET
+    write_json(root / "calibration.json", calibration())
+    names = [recording["name"] for recording in manifest()["recordings"]]
+    for name in names:
+        write_json(root / name / "integrity.json", integrity(name))
+    for recording in ("rest", "sine"):
+        _write_rates(root / recording / "rates.parquet", recording)
+        for axis, gyros in (("x", GYROS), ("z", ("solo",))):
+            _write_array(root / recording / axis, recording, axis, gyros, failed_check)
+    noise = {"gyros": list(GYROS), "arw": NOISE, "rrw": NOISE, "correlation": np.eye(4).tolist()}
+    write_json(root / "noise" / "x.json", noise)
+    inputs = {
+        "calibration": [root / "calibration.json"],
+        "integrity": [root / name / "integrity.json" for name in names],
+        "noise": [root / "noise" / "x.json"],
+        "artefacts": sorted(root.rglob("*.parquet")),
+    }
+    outputs = {"page": folder / "reports" / f"{DATASET}.html", "headline": root / "headline.json"}
+    options = {
+        "dataset": DATASET,
+        "manifest": manifest(simulated),
+        "board": board(),
+        "analysis": {"metrics": {"welch_s": 100.0}},
+    }
+    return Task(inputs, outputs, options, "code")
+
+
+def _write_rates(path: Path, recording: str) -> None:
+    rng = np.random.default_rng(7)
+    time = np.arange(12_000) / 10
+    moving = recording == "sine"
+    truth = 60 * np.sin(2 * np.pi * 0.1 * time) * ((time > 300) & (time < 900)) if moving else np.zeros(len(time))
+    columns: dict[str, Any] = {
+        "time": time,
+        "segment": np.zeros(len(time), dtype=np.int32),
+        "at_rest": (truth == 0) if moving else np.ones(len(time), dtype=bool),
+        "reference": truth if moving else np.full(len(time), np.nan),
+        "temp_board": 25 + 5 * (1 - np.exp(-time / 300)),
+    }
+    for name in (*GYROS, "solo"):
+        drift = 0.0004 * np.cumsum(rng.normal(size=len(time)))
+        columns[name] = truth + drift + NOISE.get(name, 0.05) * rng.normal(size=len(time))
+    write_table(path, columns, "rates", PROVENANCE, {"rate_hz": 10.0})
+
+
+def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...], failed_check: bool) -> None:
+    fused = METHODS if len(gyros) > 1 else ()
+    columns = [f"{name}[{definition}]" if definition else name for name, definition, _, _ in fused]
+    level = {name: NOISE.get(name, 0.05) for name in gyros}
+    level |= {column: 0.05 / GAIN.get(column.split("[")[0], 2.0) for column in columns}
+    _write_curves(folder, level)
+    _write_metrics(folder, recording, axis, gyros, fused, level)
+    methods: dict[str, Any] = {
+        name: [] for name in ("method", "definition", "column", "title", "source", "causal", "note")
+    }
+    for (name, definition, title, causal), column in zip(fused, columns, strict=True):
+        lost = name == "inverse_variance_rrw"
+        note = "no RRW was found for g1" if lost else ""
+        row = (name, definition, "" if lost else column, title, "paper <eq. 1>", causal, note)
+        for key, value in zip(
+            ("method", "definition", "column", "title", "source", "causal", "note"), row, strict=True
+        ):
+            methods[key].append(value)
+    filtered = np.array([name == "jiang_random_walk" for name, *_ in fused], dtype=bool)
+    figures = {"dc_gain": 1.0, "bandwidth_hz": 1.05, "noise_bandwidth_hz": 1.65, "delay_s": 0.15}
+    for key, value in figures.items():
+        plain = 1.0 if key == "dc_gain" else 0.0 if key == "delay_s" else np.nan
+        methods[key] = np.where(filtered, value, plain)
+    if not fused:
+        methods = {
+            key: np.array([], dtype=bool if key == "causal" else float if key in figures else str) for key in methods
+        }
+    write_table(folder / "methods.parquet", methods, "methods", PROVENANCE)
+    pairs = [(a, b) for a in gyros for b in gyros]
+    value = np.array([1.0 if a == b else 0.12 if {a, b} == {"g1", "g2"} else -0.03 for a, b in pairs])
+    correlation = {"gyro": [a for a, _ in pairs], "other": [b for _, b in pairs], "correlation": value}
+    write_table(
+        folder / "correlation.parquet",
+        {**correlation, "low": value - 0.02, "high": value + 0.02},
+        "correlation",
+        PROVENANCE,
+    )
+    checks = 3
+    write_table(folder / "crosscheck.parquet", {
+        "check": ["GARCH α", "DCC a", "Allan σ(1 s)"], "against": ["arch", "pymgarch", "allantools"],
+        "window": [3, 3, -1], "series": [gyros[0], "array", gyros[0]], "ours": [0.05, 0.02, 0.04],
+        "theirs": [0.05, 0.02, 0.05 if failed_check else 0.04], "difference": [1e-7, 0.0, -0.01 if failed_check else 0.0],
+        "tolerance": [1e-4] * checks, "unit": ["1", "1", "deg/s"], "passed": [True, True, not failed_check],
+    }, "crosscheck", PROVENANCE)  # fmt: skip
+    if recording == "rest":
+        for definition in ("level", "residual"):
+            _write_volatility(folder / definition, gyros)
+
+
+def _write_curves(folder: Path, level: dict[str, float]) -> None:
+    tau = 0.02 * 2.0 ** (np.arange(42) / 3)
+    frequency = np.geomspace(0.01, 25, 800)
+    rows: dict[str, list[Any]] = {name: [] for name in ("series", "tau", "deviation", "low", "high", "edf")}
+    spectra: dict[str, list[Any]] = {name: [] for name in ("series", "frequency", "density")}
+    for name, n in level.items():
+        sigma = np.sqrt(n**2 / tau * 0.02 + (0.001 + 0.02 * n) ** 2 + (0.0001) ** 2 * tau / 3)
+        spread = 0.01 + 0.5 * tau / tau[-1]
+        values = (np.full(len(tau), name), tau, sigma, sigma / (1 + spread), sigma * (1 + spread), 2 / spread**2)
+        for key, value in zip(rows, values, strict=True):
+            rows[key].extend(value.tolist())
+        density = n * np.sqrt(0.04) * np.sqrt(1 + 0.1 / frequency)
+        for key, value in zip(spectra, (np.full(len(frequency), name), frequency, density), strict=True):
+            spectra[key].extend(value.tolist())
+    write_table(folder / "allan.parquet", rows, "allan", PROVENANCE)
+    write_table(folder / "spectrum.parquet", spectra, "spectrum", PROVENANCE)
+
+
+def _write_metrics(
+    folder: Path, recording: str, axis: str, gyros: tuple[str, ...], methods: Any, level: dict[str, float]
+) -> None:
+    rows: list[tuple[Any, ...]] = []
+
+    def add(
+        method: str, definition: str, metric: str, value: float, unit: str, note: str = "", spread: float = 0.03
+    ) -> None:
+        rows.append(
+            (recording, axis, method, definition, metric, value, value * (1 - spread), value * (1 + spread), unit, note)
+        )
+
+    series = [(name, "", name) for name in gyros]
+    series += [(name, d, f"{name}[{d}]" if d else name) for name, d, *_ in methods if name != "inverse_variance_rrw"]
+    for method, definition, column in series:
+        n = level[column]
+        add(method, definition, "sigma", n, "deg/s", "bootstrap of blocks of 20 s")
+        add(method, definition, "arw", 60 * n * 0.14, "deg/√h")
+        add(method, definition, "arw_1s", 60 * n * 0.14, "deg/√h", "band-limited: 0.88" if "jiang" in method else "")
+        drift = "the curve still falls at its end: an upper limit of the floor" if method in {"g1", "g2"} else ""
+        add(method, definition, "bias_drift", 360 * n, "deg/h", drift, 0.2)
+        rows.append(
+            (recording, axis, method, definition, "rrw", 5.0, 0.0, 31.2, "deg/h/√h", "not shown to exist: < 31.2")
+        )
+        if method not in gyros:
+            unsure = method == "median"
+            factor = 0.0775 / n
+            note = "not significant" if unsure else ""
+            add(method, definition, "if_sigma", factor, "1", "", 0.02)
+            add(method, definition, "if_bias_drift", 1.1 if unsure else factor, "1", note, 0.3)
+        if recording == "sine":
+            add(method, definition, "error_sigma", n, "deg/s")
+            rows.append(
+                (
+                    recording,
+                    axis,
+                    method,
+                    definition,
+                    "delay",
+                    np.nan,
+                    np.nan,
+                    np.nan,
+                    "s",
+                    "the reference does not change",
+                )
+            )
+    names = ("recording", "axis", "method", "definition", "metric", "value", "low", "high", "unit", "note")
+    write_table(
+        folder / "metrics.parquet",
+        {name: [row[i] for row in rows] for i, name in enumerate(names)},
+        "metrics",
+        PROVENANCE,
+    )
+
+
+def _write_volatility(folder: Path, gyros: tuple[str, ...]) -> None:
+    count = 28
+    start = np.append(np.arange(count) * 30, 0)
+    place = {
+        "window": np.append(np.arange(count), -1), "start": start, "stop": start + 360,
+        "time_start": start + 0.5, "time_stop": start + 359.5,
+    }  # fmt: skip
+    arch: dict[str, list[Any]] = {
+        k: [] for k in ("gyro", "series", "lags", "samples", "statistic", "p_value", "kurtosis", "status")
+    }
+    for gyro in gyros:
+        for series, statistic, p in (("level", 420.0, 0.0), ("detrended", 1.2, 0.27), ("standardised", 0.4, 0.53)):
+            flat = gyro == "g3" and series == "standardised"
+            row = (
+                gyro,
+                series,
+                1,
+                1200,
+                np.nan if flat else statistic,
+                np.nan if flat else p,
+                3.1,
+                "no variance" if flat else "ok",
+            )
+            for key, value in zip(arch, row, strict=True):
+                arch[key].append(value)
+    write_table(folder / "arch_lm.parquet", arch, "arch_lm", PROVENANCE)
+    garch = {name: np.tile(values, len(gyros)) for name, values in place.items()}
+    rows = (count + 1) * len(gyros)
+    wave = np.sin(np.arange(rows))
+    garch |= {
+        "gyro": np.repeat(gyros, count + 1), "omega": 1e-5 + 0 * wave, "alpha": 0.05 + 0.02 * wave, "beta": 0.9 - 0.03 * wave,
+        "se_omega": 1e-6 + 0 * wave, "se_alpha": 0.02 + 0 * wave, "se_beta": 0.05 + 0 * wave, "log_likelihood": -500 + wave,
+        "status": np.where(wave < -0.8, "boundary", "converged"),
+    }  # fmt: skip
+    write_table(folder / "garch.parquet", garch, "garch", PROVENANCE)
+    single = len(gyros) == 1
+    wave = np.sin(np.arange(count + 1)) * 0.01 + (np.nan if single else 0)
+    dcc: dict[str, Any] = {
+        **place, "a": 0.03 + wave, "b": 0.9 - wave, "se_a": 0.01 + 0 * wave, "se_b": 0.05 + 0 * wave,
+        "se_a_hessian": 0.006 + 0 * wave, "se_b_hessian": 0.03 + 0 * wave, "log_likelihood": wave, "log_likelihood_ccc": wave,
+        "target": [[0.1] * (len(gyros) * (len(gyros) - 1) // 2)] * (count + 1), "statistic": 4 + wave, "p_value": 0.1 + 6 * wave,
+        "p_value_s": 0.08 + 6 * wave, "status": ["one gyro" if single else "converged"] * (count + 1),
+    }  # fmt: skip
+    write_table(folder / "dcc.parquet", dcc, "dcc", PROVENANCE)
+    time = np.arange(1200) + 0.5
+    fading = 0.3 - 0.2 * (time > 600) if not single else np.ones(len(time))
+    weights: dict[str, list[Any]] = {}
+    for mode in ("in_sample", "causal"):
+        part: dict[str, Any] = {
+            "time": time,
+            "segment": np.zeros(len(time), dtype=int),
+            "model": ["dcc"] * 1200,
+            "mode": [mode] * 1200,
+        }
+        part["sigma"] = 0.02 + 0 * time
+        for index, gyro in enumerate(gyros):
+            part[f"w_{gyro}"] = fading if index == 3 or single else (1 - fading) / 3
+            part[f"sd_{gyro}"] = NOISE.get(gyro, 0.05) * (1 + 0.1 * np.sin(time / 100))
+        part["status"] = np.where(time < 360, "no model yet", "ok") if mode == "causal" else np.full(1200, "ok")
+        for key, value in part.items():
+            weights.setdefault(key, []).extend(np.asarray(value).tolist())
+    write_table(folder / "weights.parquet", weights, "weights", PROVENANCE)
+
+
+@pytest.fixture(scope="session")
+def report_task(tmp_path_factory: pytest.TempPathFactory) -> Task:
+    """The report task over the small data set."""
+    return build(tmp_path_factory.mktemp("bench"))
