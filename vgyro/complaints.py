@@ -171,7 +171,8 @@ def _known_keys(model: type[BaseModel], path: Path, data: Any) -> list[str]:
         node = node[step]
         if isinstance(step, str):
             fields = [candidate.model_fields[step] for candidate in candidates if step in candidate.model_fields]
-            candidates = [inner for field in fields for inner in _models_in(field.annotation)]
+            # A step that is no field is the key of a mapping, whose models are the candidates already.
+            candidates = [inner for field in fields for inner in _models_in(field.annotation)] if fields else candidates
         if isinstance(node, dict):
             candidates = [inner for inner in candidates if node.get("kind") in _tags(inner)] or candidates
     return list(dict.fromkeys(name for candidate in candidates for name in candidate.model_fields))

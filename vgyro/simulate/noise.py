@@ -103,8 +103,8 @@ def unit_flicker(samples: int, generator: np.random.Generator) -> np.ndarray:
     Independent normal Fourier coefficients of the right variance at every bin of a stretch twice as long, of which the
     first half is kept: the density is exact from 1/(2·duration) to half the rate, and the end does not join the start.
     What lies below 1/(2·duration) looks like a constant over the stretch; the mean is taken out, so that it is the
-    constant bias alone. The Allan deviation of many stretches is 0.664 within 2 % from 8 samples to a tenth of the
-    stretch; that of a single one scatters, at a tenth by a sixth.
+    constant bias alone. Expected Allan deviation: 0.664 within 1 % from 8 samples to a third of the stretch (1.09 times
+    that at one sample, as the density ends at half the rate); one stretch scatters by a fifth at a tenth of its length.
     """
     from scipy.fft import irfft, next_fast_len
 
