@@ -51,11 +51,8 @@ def write_artefacts(folder, manifest):
 
     put("z/fused.parquet", {**about, **dict.fromkeys((*METHODS, "dcc_in_sample[level]"), mean)}, "fused")
     known = [(name, "", name) for name in METHODS] + [("dcc_in_sample", "level", "dcc_in_sample[level]")]
-    put(
-        "z/methods.parquet",
-        dict(zip(("method", "definition", "column"), zip(*known, strict=True), strict=True)),
-        "methods",
-    )
+    methods = dict(zip(("method", "definition", "column"), zip(*known, strict=True), strict=True))
+    put("z/methods.parquet", {**methods, "bandwidth_hz": [np.nan] * 6, "dc_gain": [1.0] * 6}, "methods")
     put("z/metrics.parquet", metrics_table(manifest), "metrics")
     pairs = [(a, b) for a in GYROS for b in GYROS]
     put("z/correlation.parquet", {
@@ -171,7 +168,7 @@ def test_the_mean_at_constant_rate_is_the_set_rate_and_the_mean_error(made):
 def test_weight_of_the_faulty_gyro_by_stretch(tmp_path, options):
     manifest, board = options("liu2015")
     paths = write_artefacts(tmp_path / "results" / "liu2015", manifest)
-    evidence = gather(paths, manifest, board, VolatilityOptions(), MetricsOptions(bootstrap=50))
+    evidence = gather(paths, manifest, board, VolatilityOptions(), MetricsOptions(bootstrap=50), slow_series=False)
     wanted = {"definition": "level", "model": "dcc", "mode": "in_sample", "gyro": "g4"}
     shares = {row["stretch"]: row["value"] for row in evidence.find("weights", wanted)}
     assert shares == {"before 1000 s": pytest.approx(0.1), "after 2500 s": 0.0}
