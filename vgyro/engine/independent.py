@@ -1,4 +1,4 @@
-"""Second routes to results of this package, for the cross-check: slow and plain, written from the definitions."""
+"""Second routes to results of this package, for the cross-check: plain, written from the definitions."""
 
 from __future__ import annotations
 
@@ -26,18 +26,40 @@ def nnls_weights(H: np.ndarray) -> np.ndarray:
 def textbook_allan_deviation(rate: np.ndarray, rate_hz: float, tau: float, segment: np.ndarray | None = None) -> float:
     """Overlapping Allan deviation at one τ by its definition: half the mean square of differences of adjacent means.
 
-    rate    : array [T], deg/s;  tau : s, a whole number of samples;  segment : array [T]; no mean crosses a border
-    returns : deg/s; NaN where no stretch holds two means
-    IEEE Std 952, eq. for the Allan variance; every pair of adjacent means of τ, one pair a sample.
+    rate    : array [T], deg/s;  tau : s, a whole number of samples
+    segment : array [T]; no mean crosses a border, and a stretch shorter than 3τ is left out
+    returns : deg/s; NaN where no stretch is long enough
+    IEEE Std 952 defines it by means of the rate, not by the angle; the means are running sums in extended precision.
     """
     length = round(tau * rate_hz)
-    marks = np.zeros(len(rate), dtype=int) if segment is None else np.asarray(segment)
+    stretches = [rate] if segment is None else np.split(rate, np.flatnonzero(np.diff(segment)) + 1)
     total, pairs = 0.0, 0
-    for mark in np.unique(marks):
-        stretch = rate[marks == mark]
-        for start in range(len(stretch) - 2 * length + 1):
-            first = stretch[start : start + length].mean()
-            second = stretch[start + length : start + 2 * length].mean()
-            total += (second - first) ** 2
-            pairs += 1
+    for stretch in stretches:
+        if len(stretch) < 3 * length:
+            continue
+        running = np.concatenate([[0.0], np.cumsum(stretch - stretch.mean(), dtype=np.longdouble)])
+        means = (running[length:] - running[:-length]) / length
+        difference = means[length:] - means[:-length]
+        total += float(np.sum(difference**2))
+        pairs += len(difference)
     return float(np.sqrt(total / (2 * pairs))) if pairs else float("nan")
+
+
+def printed_filter(rate: np.ndarray, rate_hz: float, R: np.ndarray, q: float, tau: float) -> np.ndarray:
+    """Steady-state filter of Jiang et al. (2012), eq. 11-14, run by filterpy sample by sample.
+
+    rate : array [T, N], deg/s, one gap-free stretch;  R : [N, N], (deg/s)²/Hz;  q : deg²/s³;  tau : s, inf: random walk
+    returns : [T], the estimate that each sample yields, deg/s
+    filterpy's steps are x ← Fx, x ← x + K(z - 1x). With g = (1 - e^(-sT))·K∞/s their F is e^(-sT)/(1 - g1) and their K
+    is g.
+    """
+    from vgyro.engine.reference.kalman import constant_gain_filter
+
+    one = np.ones(len(R))
+    inverse = np.linalg.inv(R)
+    D = one @ inverse @ one
+    s = np.sqrt(1.0 / tau**2 + D * q)
+    steady = (s - 1.0 / tau) / D * (one @ inverse)
+    keep = np.exp(-s / rate_hz)
+    gain = (1.0 - keep) / s * steady
+    return constant_gain_filter(rate, keep / (1.0 - gain.sum()), gain, float(rate[0] @ steady / steady.sum()))

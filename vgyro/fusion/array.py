@@ -28,11 +28,13 @@ class ArrayNoise:
     arw         : array [N], deg/s/√Hz two-sided; NaN where it was not measured
     rrw         : array [N], deg/s/√s; NaN where it was not measured, 0 where none was found
     correlation : array [N, N] of the noise, unit diagonal
+    rrw_note    : what to know of the rate random walks
     """
 
     arw: np.ndarray
     rrw: np.ndarray
     correlation: np.ndarray
+    rrw_note: str = ""
 
     @property
     def R(self) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
@@ -25,7 +27,7 @@ def inverse_variance_arw(array: ArrayRates, parameters: FilterParameters) -> Fus
 
 def inverse_variance_rrw(array: ArrayRates, parameters: FilterParameters) -> Fused:  # noqa: ARG001
     """Fixed weights w_i ∝ 1/K_i² from the measured rate random walk: least drift, correlations left out."""
-    return _inverse_variance(array, array.noise.rrw, "rate random walk")
+    return replace(_inverse_variance(array, array.noise.rrw, "rate random walk"), note=array.noise.rrw_note)
 
 
 def _inverse_variance(array: ArrayRates, coefficient: np.ndarray, name: str) -> Fused:

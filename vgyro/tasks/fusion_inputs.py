@@ -14,7 +14,7 @@ from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights
 from vgyro.fusion.array import WeightKey
 from vgyro.storage.tables import read_columns, read_json
 from vgyro.tasks.common import Task
-from vgyro.tasks.volatility_series import sample_rate
+from vgyro.tasks.rates_file import ArrayFile, read_array
 
 
 @dataclass(frozen=True)
@@ -35,16 +35,13 @@ def open_array(task: Task) -> OpenArray:
     fusion = FusionOptions.model_validate(analysis.get("fusion", {}))
     volatility = VolatilityOptions.model_validate(analysis.get("volatility", {}))
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
-    table = read_columns(task.input("rates"), ["time", "segment", "at_rest", *gyros])
-    rate_hz = sample_rate(task.input("rates"), table["time"])
-    at_rest = table["at_rest"].astype(bool)
-    block_hz = rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
-    weights, reasons = read_weights(task.inputs.get("weights", []), gyros, table, block_hz, rate_hz)
-    values = np.column_stack([table[gyro] for gyro in gyros]).astype(float)
+    file = read_array(task.input("rates"), gyros, task.options["axis"])
+    block_hz = file.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
+    weights, reasons = read_weights(task.inputs.get("weights", []), gyros, file, block_hz)
     noise = read_noise(task.input("noise"), gyros)
-    rates = ArrayRates(values, rate_hz, table["segment"], at_rest, noise, weights, reasons)
-    parameters = FilterParameters.of(fusion, in_motion(task.options["kind"], at_rest), block_hz)
-    return OpenArray(gyros, table["time"], rates, parameters, fusion, volatility)
+    rates = ArrayRates(file.rate, file.rate_hz, file.segment, file.at_rest, noise, weights, reasons)
+    parameters = FilterParameters.of(fusion, in_motion(task.options["kind"], file.at_rest), block_hz)
+    return OpenArray(gyros, file.time, rates, parameters, fusion, volatility)
 
 
 def in_motion(kind: str, at_rest: np.ndarray) -> bool:
@@ -56,26 +53,25 @@ def read_noise(path: Path, gyros: list[str]) -> ArrayNoise:
     """Noise of an array from noise/<axis>.json; a coefficient that was not found is NaN."""
     record = read_json(path)
     places = [record["gyros"].index(gyro) for gyro in gyros]
-    arw, rrw = (_numbers(record[name])[places] for name in ("arw", "rrw"))
-    return ArrayNoise(arw, rrw, _numbers(record["correlation"])[np.ix_(places, places)])
-
-
-def _numbers(values: list) -> np.ndarray:
-    return np.array(values, dtype=float)
+    arw, rrw = (np.array([record[name][gyro] for gyro in gyros], dtype=float) for name in ("arw", "rrw"))
+    correlation = np.array(record["correlation"], dtype=float)[np.ix_(places, places)]
+    limits = [gyro for gyro in gyros if str(record["rrw_source"][gyro]).startswith("upper limit")]
+    note = f"no random walk was found for {', '.join(limits)}: its upper limit stands in" if limits else ""
+    return ArrayNoise(arw, rrw, correlation, note)
 
 
 def read_weights(
-    paths: list[Path], gyros: list[str], table: dict[str, np.ndarray], block_hz: float, rate_hz: float
+    paths: list[Path], gyros: list[str], file: ArrayFile, block_hz: float
 ) -> tuple[SampleWeights, dict[WeightKey, str]]:
     """Weights of every model, mode and definition, ready for the samples of the rates; and why there are none.
 
     paths : weights.parquet, each in the folder that its definition names
-    table : time and segment of the samples
+    file  : the samples;  block_hz : rate of the volatility series
     """
     blocks: dict[WeightKey, tuple[np.ndarray, np.ndarray]] = {}
     reasons: dict[WeightKey, str] = {}
     # As long as vgyro.volatility makes its blocks: a whole number of samples.
-    block_s = max(1, round(rate_hz / block_hz)) / rate_hz
+    block_s = max(1, round(file.rate_hz / block_hz)) / file.rate_hz
     for path in paths:
         rows = read_columns(path)
         for model, mode in sorted(set(zip(rows["model"], rows["mode"], strict=True))):
@@ -86,6 +82,6 @@ def read_weights(
                 continue
             weights = np.column_stack([rows[f"w_{gyro}"][chosen] for gyro in gyros])
             time, segment = rows["time"][chosen], rows["segment"][chosen]
-            block = block_of_sample(table["time"], table["segment"], time, segment, block_s, rate_hz)
+            block = block_of_sample(file.time, file.segment, time, segment, block_s, file.rate_hz)
             blocks[key] = (weights, block)
     return SampleWeights(blocks), reasons

@@ -1,0 +1,52 @@
+"""A row of the cross-check: our figure, the other route's, and whether they agree."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+import pyarrow as pa
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of crosscheck.parquet; window -1: a whole recording."""
+
+    check: str
+    against: str
+    window: int
+    series: str
+    ours: float
+    theirs: float
+    difference: float
+    tolerance: float
+    unit: str
+    passed: bool
+
+
+def compare(
+    check: str,
+    against: str,
+    window: int,
+    series: str,
+    ours: np.ndarray | float,
+    theirs: np.ndarray | float,
+    tolerance: float,
+    unit: str,
+) -> Row:
+    """Compare two figures, or of two arrays the elements that differ most; a NaN on one side does not pass."""
+    first, second = np.ravel(ours).astype(float), np.ravel(theirs).astype(float)
+    distance = np.abs(first - second)
+    worst = int(np.argmax(np.where(np.isnan(distance), np.inf, distance)))
+    difference = float(first[worst] - second[worst])
+    passed = bool(abs(difference) <= tolerance)
+    return Row(
+        check, against, window, series, float(first[worst]), float(second[worst]), difference, tolerance, unit, passed
+    )
+
+
+def columns_of(rows: list[Row]) -> pa.Table:
+    """Rows → table; without rows, too, the columns have their types."""
+    kinds = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
+    schema = pa.schema([(field.name, kinds[str(field.type)]) for field in fields(Row)])
+    return pa.Table.from_pylist([asdict(row) for row in rows], schema=schema)
