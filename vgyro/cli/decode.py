@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vgyro.board import Board
-    from vgyro.storage.decode import DumpReader
+    from vgyro.storage.frames import Reader
     from vgyro.storage.integrity import Integrity
 
 EPILOG = """\
@@ -44,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Decode, print, return the exit code."""
     from vgyro.config import IntegrityOptions
-    from vgyro.storage.decode import DumpReader
+    from vgyro.dataset import Recording
+    from vgyro.storage.decode import open_recording
     from vgyro.storage.inputs import read_board
     from vgyro.storage.integrity import Refused
 
@@ -54,9 +55,10 @@ def run(options: argparse.Namespace) -> int:
         from vgyro.cli.sniffing import best_board
 
         board = best_board(options.dumps[0], options.boards)[0]
-    reader = DumpReader(options.dumps, board, board.rate_hz, IntegrityOptions(), boards=options.boards)
+    recording = Recording(name="dump", kind="free", files=tuple(map(str, options.dumps)))
+    reader = open_recording(options.dumps, recording, board, IntegrityOptions(), boards=options.boards)
     try:
-        read_all(reader, board, options.out)
+        read_all(reader, options.dumps, board, options.out)
     except Refused as refused:
         show(refused.integrity, options.json)
         raise
@@ -65,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def read_all(reader: DumpReader, board: Board, out: Path | None) -> None:
+def read_all(reader: Reader, dumps: list[Path], board: Board, out: Path | None) -> None:
     """Read every frame; write them to `out` if it is given.  raises : Refused"""
     from vgyro.storage.tables import Provenance, TableWriter, sha256_of_file
     from vgyro.tasks.closure import code_hash
@@ -74,7 +76,7 @@ def read_all(reader: DumpReader, board: Board, out: Path | None) -> None:
         for _ in reader:
             pass
         return
-    inputs = {Path(path).name: sha256_of_file(path) for path in reader.paths}
+    inputs = {path.name: sha256_of_file(path) for path in dumps}
     provenance = Provenance(inputs, hashlib.sha256(board.model_dump_json().encode()).hexdigest(), code_hash(__name__))
     with TableWriter(out, "frames", provenance) as writer:
         for chunk in reader:
