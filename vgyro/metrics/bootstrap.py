@@ -11,6 +11,7 @@ from vgyro.metrics.correlation import autocorrelation, correlation_length
 
 UNIT_S = 1.0
 FEWEST_UNITS = 8
+FEWEST_BLOCKS = 8
 
 
 @dataclass(frozen=True)
@@ -27,15 +28,25 @@ class Units:
     steps: np.ndarray
     step_count: np.ndarray
 
+    def only(self, column: int) -> Units:
+        """The units of one series."""
+        one = slice(column, column + 1)
+        return Units(self.count, self.total[:, one], self.squares[:, one], self.steps[:, one], self.step_count)
+
+    def block_length(self, column: int) -> int:
+        """Length of the blocks for one series, in units."""
+        return block_length(self.total[:, column] / self.count)
+
 
 def block_length(units: np.ndarray) -> int:
     """Length of the bootstrap's blocks for a series [U] of unit means.
 
     (6^(1/2) ρ/(1-ρ²))^(2/3) · U^(1/3), the rule for an AR(1) series (Carlstein 1986; Politis & White 2004), ρ that of
-    the AR(1) with the series' own correlation length; at least U^(1/3), at most U/4.
+    the AR(1) with the series' own correlation length; at least U^(1/3), at most U/8, so that there are blocks to
+    choose from: limits of a series that drifts all the time are then too narrow.
     """
     number = len(units)
-    lowest, highest = int(np.ceil(number ** (1 / 3))), max(number // 4, 1)
+    lowest, highest = int(np.ceil(number ** (1 / 3))), max(number // FEWEST_BLOCKS, 1)
     centred = units - units.mean()
     if number < FEWEST_UNITS or not np.any(centred):
         return min(lowest, highest)
@@ -103,8 +114,7 @@ def resample(units: Units, replicates: int, seed: int, block: int | None = None)
     """
     number, series = units.total.shape
     if block is None:
-        means = units.total / units.count[:, None]
-        block = max(block_length(means[:, column]) for column in range(series))
+        block = max(units.block_length(column) for column in range(series))
     blocks = -(-number // block)
     starts = np.random.default_rng(seed).integers(0, number - block + 1, (replicates, blocks))
     count = _block_sums(units.count[:, None], starts, block)

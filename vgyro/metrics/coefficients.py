@@ -15,6 +15,7 @@ FLICKER = 2 * math.log(2) / math.pi
 PASSES = 12
 FEWEST_POINTS = 6
 STEPS_OF_BISECTION = 14
+LOWEST_SHARE = 1e-6  # of the variance found: a model may not fall below it
 
 
 @dataclass(frozen=True)
@@ -57,39 +58,49 @@ def noise_coefficients(
     dc_gain      : gain of that filter for a constant rate; all coefficients are divided by it
     replicates   : draws for the intervals;  seed : of the draws;  confidence : None takes that of the curve
     returns      : NoiseCoefficients, NaN with a note where the curve has fewer than 3 points
-    Without a bandwidth the shortest τ are left out while they do not fit the rest (the gyro's own low-pass, quantised
-    output). The limits invert a test: a value is inside when fits to curves drawn with it (chi² of each edf, correlated
-    between the τ as the fitted spectrum implies, the other two terms fitted again) straddle the value found. Where a
-    fit without the term would give as large a value by chance, low = 0.
+    Without a bandwidth, where the shortest τ do not fit the rest, a term in 1/τ² of either sign is added (a low-pass of
+    the gyro itself makes -3TcN²/2τ², quantised output 3Q²/τ²), and the τ that still do not fit are left out.
+    The limits invert a test: a value is inside when fits to curves drawn with it (chi² of each edf, correlated between
+    the τ as the fitted spectrum implies, the other terms fitted again) straddle the value found. Where a fit without
+    the term would give as large a value by chance, low = 0.
     Model: IEEE Std 952-1997, annex C.  Low-pass: first-order Gauss-Markov rate, Tc = 1/(2π·bandwidth).
     """
     confidence = curve.confidence if confidence is None else confidence
-    used = np.isfinite(curve.deviation) & (curve.edf > 0)
     constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
-    if constant:
-        used &= curve.tau >= 2 * constant
+    used = np.isfinite(curve.deviation) & (curve.edf > 0) & (curve.tau >= 2 * constant)
     if used.sum() < len(TERMS):
         nothing = Coefficient(math.nan, math.nan, math.nan)
-        return NoiseCoefficients(
-            nothing, nothing, nothing, math.nan, math.nan, "fewer than 3 points of the Allan curve"
-        )
+        note = "fewer than 3 points of the Allan curve"
+        return NoiseCoefficients(nothing, nothing, nothing, math.nan, math.nan, note)
     tau, variance, edf = curve.tau[used], curve.deviation[used] ** 2, curve.edf[used]
     if not variance.any():
         zero = Coefficient(0.0, 0.0, 0.0)
         return NoiseCoefficients(zero, zero, zero, float(tau[0]), 0.0, "the series is constant")
-    first = 0 if constant else _first_fitting(_columns(tau, 0.0), variance, edf, tau)
-    tau, variance, edf = tau[first:], variance[first:], edf[first:]
     columns = _columns(tau, constant)
+    first = 0 if constant else _first_fitting(columns, variance, edf, tau)
+    if first:
+        columns = np.column_stack([columns, tau**-2])
+        first = _first_fitting(columns, variance, edf, tau)
+    tau, variance, edf, columns = tau[first:], variance[first:], edf[first:], columns[first:]
     fitted = _fit(columns, variance, edf)
     draws = _draws(tau, edf, fitted, replicates, seed)
-    limits = [_limits(columns, variance, edf, draws, term, fitted, (1 - confidence) / 2) for term in range(3)]
-    N, B, K = (
-        Coefficient(*(math.sqrt(value) / dc_gain for value in (fitted[term], *limits[term]))) for term in range(3)
-    )
-    model = columns @ fitted
+    tail = (1 - confidence) / 2
+    found = []
+    for term in range(len(TERMS)):
+        limits = _limits(columns, variance, edf, draws, term, fitted, tail)
+        found.append(Coefficient(*(math.sqrt(value) / dc_gain for value in (float(fitted[term]), *limits))))
+    model = np.maximum(columns @ fitted, LOWEST_SHARE * variance)
     misfit = float(np.mean((variance - model) ** 2 * edf / (2 * model**2)))
-    note = f"fitted from τ = {tau[0]:.3g} s" if first or constant else ""
-    return NoiseCoefficients(N, B, K, float(tau[0]), misfit, note)
+    N, B, K = found
+    return NoiseCoefficients(N, B, K, float(tau[0]), misfit, _note(fitted, float(tau[0]), first > 0 or constant > 0))
+
+
+def _note(fitted: np.ndarray, tau: float, late: bool) -> str:
+    notes = [f"fitted from τ = {tau:.3g} s"] if late else []
+    if len(fitted) > len(TERMS):
+        kind = "the gyro's own low-pass" if fitted[-1] < 0 else "noise of the angle (quantisation)"
+        notes.append(f"with a term 1/τ² for {kind}")
+    return ", ".join(notes)
 
 
 def model_deviation(tau: np.ndarray, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None) -> np.ndarray:
@@ -111,19 +122,24 @@ def _columns(tau: np.ndarray, constant: float) -> np.ndarray:
     return np.column_stack([low_pass_factor(tau, constant) / tau, np.full_like(tau, FLICKER), tau / 3])
 
 
-def _solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Weighted non-negative least squares, exact: all subsets of at most three columns; targets [R, M] → [R, 3]."""
+def _solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray, terms: int) -> np.ndarray:
+    """Weighted least squares, the first `terms` unknowns not negative, the others free; targets [R, M] → [R, C].
+
+    Exact: every subset of the at most three bounded columns is tried, and the best admissible one taken.
+    """
     number = columns.shape[1]
+    free = tuple(range(terms, number))
     root = np.sqrt(weights)
     scaled, wanted = columns * root[:, None], targets * root
-    best, cost = np.zeros((len(targets), number)), np.sum(wanted**2, axis=1)
-    for size in range(1, number + 1):
-        for subset in combinations(range(number), size):
+    best, cost = np.zeros((len(targets), number)), np.full(len(targets), np.inf)
+    for size in range(terms + 1):
+        for chosen in combinations(range(terms), size):
+            subset = chosen + free
             part = scaled[:, subset]
             norm = np.linalg.norm(part, axis=0)
             values = wanted @ np.linalg.pinv(part / norm).T / norm
             residual = np.sum((wanted - values @ part.T) ** 2, axis=1)
-            better = (values >= 0).all(axis=1) & (residual < cost)
+            better = (values[:, :size] >= 0).all(axis=1) & (residual < cost)
             cost = np.where(better, residual, cost)
             row = np.zeros((len(targets), number))
             row[:, subset] = values
@@ -134,17 +150,18 @@ def _solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray) -> np.
 def _fit(
     columns: np.ndarray, variance: np.ndarray, edf: np.ndarray, held: tuple[int, float] | None = None
 ) -> np.ndarray:
-    """Squared coefficients [3]; weights from the model, not the data, or low points would pull it down."""
-    free = [term for term in range(3) if held is None or term != held[0]]
+    """Squared coefficients [C]; weights from the model, not the data, or low points would pull it down."""
+    open_terms = [term for term in range(columns.shape[1]) if held is None or term != held[0]]
+    bounded = len(TERMS) - (held is not None)
     known = columns[:, held[0]] * held[1] if held else np.zeros(len(variance))
     scale = np.maximum(variance, np.max(variance) * 1e-12)
-    values = np.zeros(3)
+    values = np.zeros(columns.shape[1])
     if held:
         values[held[0]] = held[1]
     for _ in range(PASSES):
-        part = _solve(columns[:, free], (variance - known)[None], edf / (2 * scale**2))[0]
-        values[free] = part
-        following = np.maximum(columns @ values, 1e-6 * variance)
+        part = _solve(columns[:, open_terms], (variance - known)[None], edf / (2 * scale**2), bounded)[0]
+        values[open_terms] = part
+        following = np.maximum(columns @ values, LOWEST_SHARE * variance)
         if np.allclose(following, scale, rtol=1e-9, atol=0):
             break
         scale = following
@@ -200,8 +217,8 @@ def _limits(
     found = float(fitted[term])
 
     def share_below(value: float) -> float:
-        model = columns @ _fit(columns, variance, edf, (term, value))
-        drawn = _solve(columns, draws * model, edf / (2 * model**2))[:, term]
+        model = np.maximum(columns @ _fit(columns, variance, edf, (term, value)), LOWEST_SHARE * variance)
+        drawn = _solve(columns, draws * model, edf / (2 * model**2), len(TERMS))[:, term]
         # A value found at zero is shared with all draws at zero; half of the ties count.
         return float(np.mean(drawn < found) + np.mean(drawn == found) / 2) if found > 0 else float(np.mean(drawn <= 0))
 

@@ -43,9 +43,9 @@ def dynamic_figures(
     drawn = resample(raw, options.bootstrap, options.seed)
     readings = []
     for column, error in enumerate(errors):
-        of_error = moments(raw, drawn, column, options.confidence)
+        of_error = moments(raw, column, options.bootstrap, options.seed, options.confidence)
         row = {"error_mean": of_error["mean"], "error_sigma": of_error["sigma"]}
-        row.update(_shifted(error, rate_hz, options, drawn.block))
+        row.update(_shifted(error, rate_hz, options))
         readings.append(row)
     for column in range(singles, len(errors)):
         readings[column].update(_factors(readings, drawn, singles, column, options.confidence))
@@ -58,15 +58,16 @@ def _skips(known: np.ndarray) -> np.ndarray:
     return np.cumsum(np.diff(index, prepend=index[:1] - 1) > 1) % 2 if index.size else index
 
 
-def _shifted(error: DynamicErrors, rate_hz: float, options: MetricsOptions, block: int) -> dict[str, Reading]:
+def _shifted(error: DynamicErrors, rate_hz: float, options: MetricsOptions) -> dict[str, Reading]:
     if error.note:
         return dict.fromkeys(SHIFTED, Reading(math.nan, math.nan, math.nan, error.note))
-    both = make_units(np.column_stack([error.aligned, error.scaled]), rate_hz, error.inner_segment)
-    drawn = resample(both, options.bootstrap, options.seed, min(block, max(len(both.count) // 2, 1)))
-    gain, delay = _resampled_fit(error, both, drawn, options)
+    sums = make_units(np.column_stack([error.aligned, error.scaled]), rate_hz, error.inner_segment)
+    block = sums.block_length(1)
+    gain, delay = _resampled_fit(error, sums, block, options)
     tail = (1 - options.confidence) / 2
     readings = {
-        name: moments(both, drawn, column, options.confidence)["sigma"] for column, name in enumerate(SHIFTED[:2])
+        name: moments(sums, column, options.bootstrap, options.seed, options.confidence)["sigma"]
+        for column, name in enumerate(SHIFTED[:2])
     }
     note = f"gain {error.gain:.6g}"
     for name, value, replicates in (
@@ -79,7 +80,7 @@ def _shifted(error: DynamicErrors, rate_hz: float, options: MetricsOptions, bloc
 
 
 def _resampled_fit(
-    error: DynamicErrors, sums: Units, drawn: Resampled, options: MetricsOptions
+    error: DynamicErrors, sums: Units, block: int, options: MetricsOptions
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gain and delay [R] of resampled blocks: one Gauss-Newton step from the fit, on the blocks' normal equations."""
     columns = np.column_stack([np.ones_like(error.shifted), error.shifted, -error.gain * error.slope])
@@ -88,8 +89,8 @@ def _resampled_fit(
     at = np.append(0, np.cumsum(sums.count[:-1])).astype(np.int64)
     units = np.stack([np.add.reduceat(product, at) for product in products], axis=1)
     running = np.concatenate((np.zeros((1, units.shape[1])), np.cumsum(units, axis=0)))
-    blocks = running[drawn.block :] - running[: -drawn.block]
-    number = -(-len(units) // drawn.block)
+    blocks = running[block:] - running[:-block]
+    number = -(-len(units) // block)
     starts = np.random.default_rng(options.seed).integers(0, len(blocks), (options.bootstrap, number))
     total = np.stack([blocks[row].sum(axis=0) for row in starts])
     step = np.linalg.solve(total[:, :9].reshape(-1, 3, 3), total[:, 9:, None])[:, :, 0]

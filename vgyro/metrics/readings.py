@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro import units
 from vgyro.metrics.allan import AllanCurve, read_curve
-from vgyro.metrics.bootstrap import Resampled, Units, percentile_limits
+from vgyro.metrics.bootstrap import Units, percentile_limits, resample
 from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, low_pass_factor
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.spectrum import Spectrum, flat_band, noise_density
@@ -48,16 +48,23 @@ def paper_readings(
     }
 
 
-def moments(sums: Units, resampled: Resampled, series: int, confidence: float) -> dict[str, Reading]:
-    """Mean and 1σ of one series, deg/s, with the limits of the moving-block bootstrap."""
-    count = sums.count.sum()
-    mean = sums.total[:, series].sum() / count
-    centred = sums.squares[:, series] - 2 * mean * sums.total[:, series] + sums.count * mean**2
+def moments(
+    sums: Units, series: int, replicates: int, seed: int, confidence: float, block: int | None = None
+) -> dict[str, Reading]:
+    """Mean and 1σ of one series, deg/s, with the limits of the moving-block bootstrap.
+
+    series : column of sums;  block : length of the blocks in units; None: by the rule of block_length for this series
+    """
+    one = sums.only(series)
+    drawn = resample(one, replicates, seed, block)
+    count = one.count.sum()
+    mean = one.total.sum() / count
+    centred = one.squares[:, 0] - 2 * mean * one.total[:, 0] + one.count * mean**2
     sigma = math.sqrt(max(centred.sum(), 0.0) / max(count - 1, 1))
-    note = f"bootstrap of blocks of {resampled.block} s"
+    note = f"bootstrap of blocks of {drawn.block} s"
     readings = {}
-    for name, value, replicates in (("mean", mean, resampled.mean), ("sigma", sigma, resampled.sigma)):
-        low, high = percentile_limits(replicates[:, [series]], confidence)
+    for name, value, found in (("mean", mean, drawn.mean), ("sigma", sigma, drawn.sigma)):
+        low, high = percentile_limits(found, confidence)
         readings[name] = Reading(float(value), float(low[0]), float(high[0]), note)
     return readings
 

@@ -84,14 +84,13 @@ def _add_moments(
     sums = make_units(values, rate_hz, segment)
     drawn = resample(sums, options.bootstrap, options.seed)
     for column, row in enumerate(readings):
-        row.update(moments(sums, drawn, column, options.confidence))
+        row.update(moments(sums, column, options.bootstrap, options.seed, options.confidence))
     if poses:
         inside = make_units(without_means(values, segment), rate_hz, segment)
-        again = resample(inside, options.bootstrap, options.seed, drawn.block)
         for column, row in enumerate(readings):
-            sigma = moments(inside, again, column, options.confidence)["sigma"]
+            sigma = moments(inside, column, options.bootstrap, options.seed, options.confidence)["sigma"]
             row["sigma"] = replace(sigma, note=f"{POSE_NOTE}; {sigma.note}")
-        drawn = replace(drawn, sigma=again.sigma)
+        drawn = replace(drawn, sigma=resample(inside, options.bootstrap, options.seed, drawn.block).sigma)
     return drawn
 
 
