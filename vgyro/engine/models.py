@@ -47,7 +47,7 @@ class DccFit:
     """DCC(1,1) of N standardised residuals: Q_t = (1-a-b)S + a z_{t-1}z'_{t-1} + b Q_{t-1}, R_t = Q_t scaled.
 
     stderr         : [2] two-step robust standard errors of (a, b); NaN where there are none
-    stderr_hessian : [2] inverse-Hessian ones, too small because they take the margins as known
+    stderr_hessian : [2] inverse-Hessian ones, which take the margins as known and the likelihood as right
     target         : [N, N] S
     log_likelihood : L_c of Liu et al. (2015), eq. 10: -½Σ(log|R| + z'R⁻¹z - z'z); no constant
     log_likelihood_ccc : the same with a = b = 0

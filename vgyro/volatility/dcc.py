@@ -29,8 +29,8 @@ def fit_dcc(
     Conventions. S = z'z/T scaled to unit diagonal (the mean is zero), Q_1 = S, 1/T throughout; a >= 0, b >= 0,
     a + b < 1. L_c has no constant: -½Σ(log|R| + z'R⁻¹z - z'z). Where a is 0, b is not identified: a = b = 0, status
     `boundary`. The two-step standard errors (Engle & Sheppard 2001) hold S fixed; the inverse-Hessian ones take the
-    margins as known and are 1.4 to 2.3 times too small on short windows. There are none for a < 0.001, and no
-    two-step ones where a margin is at its boundary (status `boundary margin`).
+    margins as known and the likelihood as right. There are none for a < 0.001, and no two-step ones where a margin is
+    at its boundary (status `boundary margin`).
     S singular: status `not positive definite`, and the identity stands for S and for every R_t. N = 1: `one gyro`.
     Engle (2002); Liu et al. (2015), eq. 4-13.
     """

@@ -46,7 +46,8 @@ HESSIAN_STEP = 1e-4
 
 def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None = None) -> DccFit:
     """Fit DCC(1,1) to z [T, N]. See vgyro.volatility.fit_dcc for the conventions."""
-    z = np.asarray(z, dtype=float)
+    # Contiguous: the rounding of a sum depends on the stride.
+    z = np.ascontiguousarray(z, dtype=float)
     samples, n = z.shape
     if n < 2:
         return _without_dynamics(z, np.eye(n), ONE_GYRO)
@@ -85,7 +86,7 @@ def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None
 
 def fit_ccc(z: np.ndarray) -> DccFit:
     """Constant conditional correlation: DCC with a = b = 0, nothing to optimise."""
-    z = np.asarray(z, dtype=float)
+    z = np.ascontiguousarray(z, dtype=float)
     n = z.shape[1]
     if n < 2:
         return _without_dynamics(z, np.eye(n), ONE_GYRO)

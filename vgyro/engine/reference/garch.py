@@ -13,8 +13,9 @@ from vgyro.engine.models import BOUNDARY, CONVERGED, FAILED, NO_VARIANCE, PERSIS
 from vgyro.engine.recursions import garch_log_likelihood, garch_variance
 
 MIN_SAMPLES = 20
-ALPHA_ZERO = 1e-6
-"""α below this is 0: the optimiser's zero."""
+ALPHA_ZERO = 1e-4
+"""α below this is 0: what is left of the likelihood there is a trend of the variance, not its memory."""
+BETA_ZERO = 1e-6
 ALPHA_NEAR_ZERO = 1e-3
 """α below this has no usable standard error: β is all but unidentified."""
 FLAT = 1e-12
@@ -39,7 +40,8 @@ def fit_garch(r: np.ndarray) -> GarchFit:
     """Fit GARCH(1,1) to each column of r [T, N], deg/s. See vgyro.volatility.fit_garch for the conventions."""
     r = np.asarray(r, dtype=float)
     fits, scales = [], []
-    for column in r.T:
+    # Contiguous columns: the rounding of a mean depends on the stride.
+    for column in np.ascontiguousarray(r.T):
         scale = float(np.mean(np.square(column)))
         fits.append(_fit_column(column, scale))
         scales.append(scale)
@@ -72,19 +74,15 @@ def _fit_column(column: np.ndarray, scale: float) -> _Series:
     # With α = 0 nothing is left but a constant variance: β = 0, ω = mean(e²).
     constant = np.array([1.0, 0.0, 0.0])
     best, best_value, fit = constant, _value(e, constant), None
-    failures = 0
-    for start in _starts(e):
-        result = _fit_from(model, start)
+    results = [result for result in (_fit_from(model, start) for start in _starts(e)) if _ended_well(result)]
+    for result in results:
         parameters = _inside(np.asarray(result.params, dtype=float))
-        failures += not _ended_well(result)
         value = _value(e, parameters)
         if parameters[1] > ALPHA_ZERO and value > best_value:
             best, best_value, fit = parameters, value, result
     if fit is None:
-        return _Series(constant, nothing, FAILED if failures == 2 else BOUNDARY)
-    if not _ended_well(fit):
-        return _Series(best, nothing, FAILED)
-    if best[1] < ALPHA_NEAR_ZERO or best[2] < ALPHA_ZERO or best[1] + best[2] >= PERSISTENCE_MAX:
+        return _Series(constant, nothing, BOUNDARY if results else FAILED)
+    if best[1] < ALPHA_NEAR_ZERO or best[2] < BETA_ZERO or best[1] + best[2] >= PERSISTENCE_MAX:
         return _Series(best, nothing, BOUNDARY)
     stderr = _stderr(fit)
     return _Series(best, stderr, CONVERGED if np.all(np.isfinite(stderr)) else BOUNDARY)

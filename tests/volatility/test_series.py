@@ -1,0 +1,121 @@
+"""Block means and the definitions of r_t, on examples worked out by hand."""
+
+import numpy as np
+import pytest
+
+from vgyro.errors import ConfigError
+from vgyro.volatility import Window, block_means, detrended, residuals, window_residuals
+
+
+def column(*values):
+    return np.array(values, dtype=float)[:, None]
+
+
+def test_blocks_by_hand():
+    rate = np.column_stack([np.arange(10.0), 10 * np.arange(10.0)])
+    series = block_means(rate, 4.0, 2.0)
+    np.testing.assert_array_equal(series.values[:, 0], [0.5, 2.5, 4.5, 6.5, 8.5])
+    np.testing.assert_array_equal(series.values[:, 1], [5, 25, 45, 65, 85])
+    np.testing.assert_array_equal(series.time, [0, 0.5, 1, 1.5, 2])
+    np.testing.assert_array_equal(series.block_index, [0, 0, 1, 1, 2, 2, 3, 3, 4, 4])
+    assert series.rate_hz == 2.0
+
+
+def test_no_block_crosses_a_gap_or_leaves_rest():
+    rate = column(*range(12))
+    segment = np.array([0] * 5 + [1] * 7)
+    rest = np.array([1, 1, 1, 1, 1, 1, 1, 0, 1, 1, 1, 1], dtype=bool)
+    time = np.concatenate([np.arange(5), 100.0 + np.arange(7)])
+    series = block_means(rate, 1.0, 0.5, segment, rest, time)
+    # Stretches: samples 0-4, 5-6, 8-11; the odd sample 4 is in no block.
+    np.testing.assert_array_equal(series.values[:, 0], [0.5, 2.5, 5.5, 8.5, 10.5])
+    np.testing.assert_array_equal(series.segment, [0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(series.stretch, [0, 0, 1, 2, 2])
+    np.testing.assert_array_equal(series.block_index, [0, 0, 1, 1, -1, 2, 2, -1, 3, 3, 4, 4])
+    np.testing.assert_array_equal(series.time, [0, 2, 100, 103, 105])
+
+
+def test_full_rate_and_rates_that_do_not_divide():
+    rate = np.random.default_rng(0).standard_normal((1000, 2))
+    np.testing.assert_array_equal(block_means(rate, 50.0, "full").values, rate)
+    odd = block_means(rate, 819.2, 100.0)
+    assert odd.rate_hz == pytest.approx(819.2 / 8)
+    assert odd.values.shape == (125, 2)
+    with pytest.raises(ConfigError, match="200"):
+        block_means(rate, 100.0, 200.0)
+
+
+def test_nothing_at_rest_gives_an_empty_series():
+    series = block_means(np.zeros((10, 3)), 1.0, 1.0, rest=np.zeros(10, dtype=bool))
+    assert series.values.shape == (0, 3)
+    assert np.all(series.block_index == -1)
+    assert residuals(series.values, "level").shape == (0, 3)
+
+
+VALUES = np.column_stack([[1.0, 2.0, 4.0, 8.0, 16.0, 32.0], [3.0, 2.0, 1.0, 0.0, 1.0, 2.0]])
+
+
+def test_definitions_by_hand():
+    window = Window(1, 4)
+    np.testing.assert_array_equal(window_residuals(VALUES, window, "level"), VALUES[1:4])
+    demeaned = window_residuals(VALUES, window, "demeaned", ahead=1)
+    # The window's mean, 14/3 and 1, also for the sample after it.
+    np.testing.assert_allclose(demeaned[:, 0], [2 - 14 / 3, 4 - 14 / 3, 8 - 14 / 3, 16 - 14 / 3])
+    np.testing.assert_allclose(demeaned[:, 1], [1, 0, -1, 0], atol=1e-15)
+    known = window_residuals(VALUES, window, "difference", segment_start=0)
+    np.testing.assert_array_equal(known[:, 0], [1, 2, 4])
+    unknown = window_residuals(VALUES, window, "difference")
+    assert np.isnan(unknown[0]).all()
+    np.testing.assert_array_equal(unknown[1:, 0], [2, 4])
+
+
+def test_residual_by_hand():
+    # Three gyros; the medians are 1, 2, 3, 10, 5; span 3, so means over up to three of them.
+    median = np.array([1.0, 2.0, 3.0, 10.0, 5.0])
+    values = median[:, None] + np.array([-1.0, 0.0, 7.0])
+    inside = window_residuals(values, Window(0, 3), "residual", span=3, ahead=2)
+    # Window 0-2: (1+2)/2, (1+2+3)/3, (2+3)/2; ahead, nothing later than t: (3+10)/2, (10+5)/2.
+    first_pass = np.array([1.5, 2.0, 2.5, 6.5, 7.5])
+    np.testing.assert_allclose(inside, values - first_pass[:, None])
+
+
+def test_residuals_keep_a_correlation_that_can_be_inverted():
+    # The plain mean as first pass would make them sum to zero at every t.
+    values = np.random.default_rng(1).standard_normal((300, 6))
+    r = residuals(values, "residual", span=15)
+    assert np.linalg.eigvalsh(np.corrcoef(r.T))[0] > 0.3
+
+
+def test_residual_removes_slow_motion():
+    t = np.arange(600)
+    motion = 0.05 * t + np.sin(2 * np.pi * t / 200)
+    noise = 0.01 * np.random.default_rng(2).standard_normal((600, 4))
+    r = residuals(noise + motion[:, None], "residual", span=15)[10:-10]
+    np.testing.assert_allclose(r.std(axis=0), 0.01, rtol=0.35)
+
+
+def test_segments_of_a_whole_series():
+    segment = np.array([0, 0, 0, 1, 1, 1])
+    difference = residuals(VALUES, "difference", segment=segment)
+    assert np.isnan(difference[[0, 3]]).all()
+    np.testing.assert_array_equal(difference[[1, 2, 4, 5], 0], [1, 2, 8, 16])
+    demeaned = residuals(VALUES, "demeaned", segment=segment)
+    np.testing.assert_allclose(demeaned[3:, 1], [-1, 0, 1])
+
+
+def test_the_future_of_a_window_does_not_enter_it():
+    values = np.random.default_rng(3).standard_normal((200, 3))
+    changed = values.copy()
+    changed[120:] += 100.0
+    for definition in ("level", "demeaned", "difference", "residual"):
+        before = window_residuals(values, Window(20, 100), definition, 15, ahead=20)
+        after = window_residuals(changed, Window(20, 100), definition, 15, ahead=20)
+        np.testing.assert_array_equal(before, after)
+
+
+def test_detrended():
+    # A line minus its centred mean is zero but for the ends, where the mean is one-sided.
+    line = column(*np.arange(20.0))
+    rest = detrended(line, 5)
+    np.testing.assert_allclose(rest[2:-2], 0, atol=1e-12)
+    np.testing.assert_allclose(rest[[0, -1], 0], [-1, 1])
