@@ -68,7 +68,9 @@ class VolatilityOptions(StrictModel):
 class FusionOptions(StrictModel):
     """Methods to run, and the parameters of the Kalman filters. A null parameter is estimated from the data."""
 
-    methods: tuple[str, ...] | Literal["all"] = Field("all", description="names of methods (docs/methods.md), or all")
+    methods: tuple[str, ...] | Literal["all"] = Field(
+        "all", description="names of methods (docs/file-formats.md), or all"
+    )
     bandwidth_hz: float = Field(1.0, gt=0, description="bandwidth that sets q of the Kalman filters, Hz")
     bandwidth_dynamic_hz: float = Field(5.0, gt=0, description="the same for recordings in motion, Hz")
     q: float | None = Field(None, gt=0, description="process noise at rest, deg²/s³; null: from bandwidth_hz")

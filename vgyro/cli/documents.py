@@ -1,6 +1,6 @@
-"""Write config/config.yaml and docs/configuration.md from the models.
+"""Write config/config.yaml, docs/configuration.md and docs/file-formats.md from the code.
 
-`python -m vgyro.cli.documents`, in the top folder. It overwrites both: keep a config.yaml of your
+`python -m vgyro.cli.documents`, in the top folder. It overwrites them: keep a config.yaml of your
 own elsewhere first.
 """
 
@@ -8,10 +8,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vgyro.cli.formats_guide import file_formats
 from vgyro.describe import config_yaml, configuration_guide
 from vgyro.storage.tables import write_text
 
-DOCUMENTS = {"config/config.yaml": config_yaml, "docs/configuration.md": configuration_guide}
+DOCUMENTS = {
+    "config/config.yaml": config_yaml,
+    "docs/configuration.md": configuration_guide,
+    "docs/file-formats.md": file_formats,
+}
 
 
 def write_documents(top: Path) -> None:
