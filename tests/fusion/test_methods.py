@@ -250,3 +250,8 @@ def test_shapes_that_do_not_fit(make_array):
     array = make_array(10, [0.1, 0.1])
     with pytest.raises(DataError, match="do not fit"):
         ArrayRates(array.rate, 200.0, array.segment[:5], array.at_rest, array.noise)
+
+
+def test_the_guide_names_every_method(root):
+    guide = (root / "docs/methods.md").read_text(encoding="utf-8")
+    assert [name for name in METHODS if f"`{name}`" not in guide] == []
