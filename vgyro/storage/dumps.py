@@ -21,7 +21,9 @@ from vgyro.storage.sources import Sources, open_sources
 from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
 
 CHUNK_BYTES = 1 << 22
+BOOT_BYTES = 4096  # an acknowledgement or boot text of so many bytes is not held against a recording
 
+LEADING = "leading bytes"
 SEEN = ("checksum", "marked invalid by the board", "truncated at the end")
 CAUSES = {NO_SYNC: "no sync", BAD_CHECKSUM: "checksum", INVALID: "marked invalid by the board"}
 
@@ -105,7 +107,8 @@ class DumpReader:
     def _note_damage(self, start: int, stop: int, lost: int, cause: str, estimate: bool) -> None:
         """Write damaged bytes down, a file at a time; the frames are lost in the file that holds most of the bytes."""
         frames = max(int(cause in SEEN), round((stop - start) / self._length))
-        self._ledger.bad += frames
+        if cause != LEADING or stop - start > BOOT_BYTES:
+            self._ledger.bad += frames
         if estimate:
             lost = frames if cause in SEEN else 0
         borders = [start, *(place for place in self._sources.borders() if start < place < stop), stop]
@@ -119,7 +122,7 @@ class DumpReader:
     def _cause(self, start: int, stop: int, damage: int) -> str:
         begins = start in (0, *self._sources.borders())
         if begins and (damage == NO_SYNC or stop - start < self._length):
-            return "leading bytes"
+            return LEADING
         return CAUSES[damage]
 
     def _gap_cause(self, kind: str, start: int, stop: int) -> str:

@@ -133,11 +133,11 @@ class TextScanner:
         rest = self._worst(self._done, 1 << 62, b"", spoilt, invalid, self._damage)
         self._damage = rest
         values = {name: column[good] for name, column in values.items()}
-        raw = np.column_stack([column.astype(np.float64) for column in values.values()]).view(np.uint8)
+        raw = np.ascontiguousarray(np.column_stack([column.astype(np.float64) for column in values.values()]))
         counter = values[self.board.counter.field].astype(np.int64) if self.board.counter else None
         stamp = values[self.board.timestamp.field].astype(np.int64) if self.board.timestamp else None
         channels = {name: values[name] for name in kept_channels(self.board)}
-        return Found(start, stop, damage, raw.reshape(len(start), -1), counter, stamp, channels)
+        return Found(start, stop, damage, raw.view(np.uint8), counter, stamp, channels)
 
     def _worst(self, begin: int, end: int, text: bytes, spoilt: np.ndarray, invalid: np.ndarray, known: int) -> int:
         worst = known

@@ -1,4 +1,4 @@
-"""Files of one recording → frames.parquet and integrity.json. A recording that cannot be used is refused, not failed."""
+"""Files of one recording → frames.parquet and integrity.json. A recording that cannot be used is refused."""
 
 from __future__ import annotations
 
