@@ -9,7 +9,8 @@ from vgyro.simulate.noise import (
     Volatility,
     correlation_matrix,
     modulated_white,
-    one_pole,
+    pole_of_motion,
+    pole_of_noise,
     unit_flicker,
     unit_random_walk,
 )
@@ -116,14 +117,27 @@ def test_random_walk_has_slope_one_half() -> None:
     assert all(walk[0] == 0.0 for walk in walks)
 
 
-def test_pole_passes_the_mean_and_halves_the_power_at_its_frequency() -> None:
-    time = np.arange(4000) / RATE
-    assert one_pole(np.full((100, 1), 7.0), 40.0, RATE) == pytest.approx(7.0)
-    tone = one_pole(np.sin(2 * np.pi * 40.0 * time)[:, None], 40.0, RATE)[400:, 0]
-    assert tone.std() == pytest.approx(0.5, rel=1e-3)  # 1/√2 of a sine's 1/√2
-    delay = 1 / (2 * RATE * np.tan(np.pi * 40.0 / RATE))
-    ramp = one_pole(time[:, None], 40.0, RATE)[-1, 0]
-    assert time[-1] - ramp == pytest.approx(delay, rel=1e-6)
+def test_noise_behind_the_pole_is_a_sampled_analogue_one() -> None:
+    # Closed forms of a sampled Ornstein-Uhlenbeck process: correlation e^-2πf/rate, and the density at rest kept at N².
+    samples, phi = 400_000, np.exp(-2 * np.pi * 40 / RATE)
+    noise = pole_of_noise(unit(samples, 1) * np.sqrt(RATE), 40.0, RATE)[:, 0]
+    assert noise.var() == pytest.approx(RATE * (1 - phi) / (1 + phi), rel=0.02)
+    assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(phi, abs=0.01)
+    frequency, density = signal.welch(noise, fs=RATE, nperseg=2000)
+    low = (frequency > 0.2) & (frequency < 4)
+    assert density[low].mean() / 2 == pytest.approx(1.0, rel=0.05)
+
+
+def test_motion_behind_the_pole_equals_the_analogue_filter() -> None:
+    # 1/(1 + s·Tc): 1/√2 and 45° at its frequency, delay Tc for a ramp.
+    rate, pole = 4000.0, 40.0
+    time = np.arange(8000) / rate
+    tone = pole_of_motion(np.sin(2 * np.pi * pole * time), pole, rate)
+    expected = np.sin(2 * np.pi * pole * time - np.pi / 4) / np.sqrt(2)
+    assert tone[2000:] == pytest.approx(expected[2000:], abs=5e-4)
+    assert pole_of_motion(np.full(100, 7.0), pole, RATE) == pytest.approx(7.0)
+    ramp = np.arange(4000) / RATE
+    assert ramp[-1] - pole_of_motion(ramp, pole, RATE)[-1] == pytest.approx(1 / (2 * np.pi * pole), rel=1e-9)
 
 
 def test_blocks_of_a_rate_that_is_no_whole_number() -> None:

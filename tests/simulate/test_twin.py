@@ -120,7 +120,9 @@ def test_jiang_has_the_printed_single_gyroscope(root: Path) -> None:
 
 
 def pole_time() -> float:
-    return 1 / (2 * 200 * np.tan(np.pi * 40 / 200))
+    """Time constant by which means of noise behind the sampled pole lose variance: Σ of its correlations, 2φ/(1-φ²)."""
+    phi = np.exp(-2 * np.pi * 40 / 200)
+    return 2 * phi / (1 - phi**2) / 200
 
 
 def flicker_variance(duration: float = 3600.0) -> float:

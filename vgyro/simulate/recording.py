@@ -21,7 +21,8 @@ from vgyro.simulate.noise import (
     White,
     correlation_matrix,
     modulated_white,
-    one_pole,
+    pole_of_motion,
+    pole_of_noise,
     unit_flicker,
     unit_random_walk,
 )
@@ -195,6 +196,8 @@ def _output(
     """Rate and white noise behind the sensor's pole, [T, N]; only gyros on the axis that turns see the rate."""
     axis = spec.axis or board.axes[0]
     turning = np.array([gyro.axis == axis for gyro in board.gyros], dtype=float)
-    fast = np.outer(reference, turning) + white.noise * faults.noise_gain + faults.burst
+    noise = white.noise * faults.noise_gain + faults.burst
     pole = pole_of(twin, spec)
-    return fast if pole is None else one_pole(fast, pole, rate_hz)
+    if pole is not None:
+        reference, noise = pole_of_motion(reference, pole, rate_hz), pole_of_noise(noise, pole, rate_hz)
+    return np.outer(reference, turning) + noise
