@@ -1,54 +1,15 @@
 """Every shipped board reads frames that are built by hand from its documented layout."""
 
 import math
-import struct
 
 import numpy as np
 import pytest
-from storage_frames import crc16, crc32, dsp6_frame, dsp6_text_line, mimu_packet
+from storage_frames import ahrs, dsp6_frame, dsp6_text_line, dsp3000, kvh, mimu_packet, stim, vectornav, xsens
 
 from vgyro.storage import decode_dump
 from vgyro.storage.sniff import all_boards, sniff
 
 COUNT = 300
-
-
-def i24(value: int) -> bytes:
-    return struct.pack(">i", value)[1:]
-
-
-def stim(head: int, index: int, gyros, middle: bytes = b"") -> bytes:
-    body = bytes([head]) + b"".join(i24(value) for value in gyros) + b"\0" + middle
-    body += struct.pack(">BH", index % 256, 500)
-    return body + struct.pack(">I", crc32(body + b"\0" * (-len(body) % 4)))
-
-
-def kvh(index: int, gyros) -> bytes:
-    body = b"\xfe\x81\xff\x55" + struct.pack(">3f3fBBh", *gyros, 0, 0, 1, 0x77, index % 128, 31)
-    return body + struct.pack(">I", crc32(body))
-
-
-def xsens(index: int, gyros) -> bytes:
-    data = struct.pack(">HBH", 0x1020, 2, index % 65536) + struct.pack(">HB3f", 0x8020, 12, *gyros)
-    body = b"\xff\x36" + bytes([len(data)]) + data
-    return b"\xfa" + body + bytes([-sum(body) % 256])
-
-
-def vectornav(index: int, gyros) -> bytes:
-    body = b"\x01" + struct.pack(
-        "<HQ3f3f3fff", 0x0601, 10_000_000 * index, 0, 0, -9.8, *gyros, 0.1, 0.2, 0.3, 25.5, 101.3
-    )
-    return b"\xfa" + body + struct.pack(">H", crc16(body, init=0))
-
-
-def ahrs(index: int, gyros) -> bytes:
-    body = struct.pack(">9hhH", *gyros, 0, 0, 0, 0, 0, 0, 1500, index % 65536)
-    return b"\xff" + body + bytes([sum(body) % 256])
-
-
-def dsp3000(index: int, rate: float) -> bytes:
-    del index
-    return b"%.6f 1\r\n" % rate
 
 
 @pytest.fixture

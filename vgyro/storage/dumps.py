@@ -153,11 +153,7 @@ class DumpReader:
         refuse_if_needed(self.integrity, self.options, where, self._remedy)
 
     def _hints(self, seen: Probe) -> list[str]:
-        found = [
-            f"{file.name} breaks off: its compressed data are not complete"
-            for file in self._sources.files
-            if file.cut_short
-        ]
+        found = [f"the compressed data of {file.name} break off" for file in self._sources.files if file.cut_short]
         counter = self.board.counter
         if counter and seen.counter_step is not None and seen.counter_step != counter.step:
             found.append(
@@ -170,10 +166,20 @@ class DumpReader:
         fits = boards_that_fit(self.paths[0], self.boards, self.board.name)
         if fits:
             return f"the file reads as board {' or '.join(fits)}: set `board` in the manifest"
+        longest = max((gap for gap in self._ledger.gaps if gap.frames_lost), key=_frames_lost, default=None)
+        if longest is not None and _frames_lost(longest) > self._ledger.lost / 2:
+            return (
+                f"most are missing in one gap at {longest.time:.6g} s: make two recordings of it, or lower"
+                " integrity.min_good_share"
+            )
         hints = self._hints(self._probe)
         if hints:
             return hints[-1]
         return "check that `board` and its frame layout are right, and that the logger stored raw bytes"
+
+
+def _frames_lost(gap: Gap) -> int:
+    return gap.frames_lost or 0
 
 
 def file_records(sources: Sources) -> list[FileRecord]:

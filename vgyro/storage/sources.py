@@ -16,6 +16,7 @@ from vgyro.validation import did_you_mean
 
 GZIP, ZSTD, PARQUET = b"\x1f\x8b\x08", b"\x28\xb5\x2f\xfd", b"PAR1"
 NAMES_SHOWN = 20
+ZSTD_PIECE = 1 << 16
 
 
 @dataclass
@@ -138,13 +139,18 @@ def _gzip_blocks(file: SourceFile, size: int) -> Iterator[bytes]:
 
 
 def _zstd_blocks(file: SourceFile, size: int) -> Iterator[bytes]:
+    # Where the data break off, the read that finds out gives nothing: small reads lose little.
+    piece = min(size, ZSTD_PIECE)
     with pa.CompressedInputStream(pa.OSFile(str(file.path)), "zstd") as stream:
-        while True:
+        held: list[bytes] = []
+        block = b"more"
+        while block:
             try:
-                block = stream.read(size)
+                block = stream.read(piece)
             except OSError:
-                file.cut_short = True
-                return
-            if not block:
-                return
-            yield block
+                file.cut_short, block = True, b""
+            held.append(block)
+            if sum(map(len, held)) > size - piece or not block:
+                if full := b"".join(held):
+                    yield full
+                held = []

@@ -125,10 +125,10 @@ def suspicions(
         times = "once" if ledger.restarts == 1 else f"{ledger.restarts} times"
         reasons.append(f"the counter or clock restarted {times}; how long the board was off is not known")
     gyros = {gyro.field: gyro.name for gyro in board.gyros}
-    clipped = [gyros[name] for name, record in channels.items() if record.clipped_share > options.max_clipped_share]
-    clipped = [name for name in clipped if name]
+    limit_share = options.max_clipped_share
+    clipped = [gyros[name] for name in gyros if name in channels and channels[name].clipped_share > limit_share]
     if clipped:
-        limit = percent(options.max_clipped_share)
+        limit = percent(limit_share)
         reasons.append(f"more than {limit} of the samples are clipped on {listed(clipped)}")
     for name, record in channels.items():
         if name in gyros and record.stuck_duration > options.stuck_s:
