@@ -60,6 +60,15 @@ def test_references_of_the_manifest(twin: Twin) -> None:
     assert manifest.recording("swing").rate_hz == 500
 
 
+def test_analysis_of_a_twin_may_be_partial() -> None:
+    # A step above the default window is right where config.yaml's window is longer.
+    recordings = "recordings: [{name: a, kind: static, duration_s: 1}]\n"
+    twin = parse_twin(HEAD + f"gyros: {{}}\n{recordings}analysis: {{volatility: {{step: 500}}}}", "t.yaml")
+    manifest = manifest_of(twin)
+    assert manifest.analysis is not None
+    assert manifest.analysis.model_dump(exclude_unset=True) == {"volatility": {"step": 500}}
+
+
 def test_overrides_go_over_all(root: Path) -> None:
     demo = shipped(root, "demo")
     truth = truth_of(demo, demo.recording("constant"), "g4")
@@ -74,6 +83,7 @@ def test_overrides_go_over_all(root: Path) -> None:
             "did you mean 'arw_deg_rt_h'",
         ),
         ("gyros: {}\nrecordings: [{name: a, kind: static}]", "give duration_s"),
+        ("gyros: {}\nrecordings: [{name: noise, kind: static, duration_s: 1}]", "no recording can be named 'noise'"),
         ("gyros: {}\nrecordings: [{name: a, kind: calibration, duration_s: 5}]", "needs motion of kind rate_table"),
         (
             "gyros: {all: {garch: {alpha: 0.5, beta: 0.6}}}\nrecordings: [{name: a, kind: static, duration_s: 1}]",

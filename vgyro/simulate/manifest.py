@@ -6,6 +6,7 @@ from typing import Any
 
 import yaml
 
+from vgyro.config import PARTIAL
 from vgyro.dataset import Manifest
 from vgyro.simulate.motion import plateaus_of
 from vgyro.simulate.twin import ConstantRate, RandomRate, RateTable, Sinusoid, Twin, TwinRecording
@@ -34,7 +35,7 @@ def manifest_of(twin: Twin) -> Manifest:
     }
     if twin.analysis is not None:
         record["analysis"] = twin.analysis.model_dump(mode="json", exclude_unset=True)
-    return Manifest.model_validate(record)
+    return Manifest.model_validate(record, context={PARTIAL: True})
 
 
 def manifest_yaml(manifest: Manifest) -> str:

@@ -8,8 +8,8 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from vgyro.board import Board
 from vgyro.complaints import did_you_mean
-from vgyro.config import Analysis, merge
-from vgyro.dataset import Kind
+from vgyro.config import PARTIAL, Analysis, merge
+from vgyro.dataset import RESERVED, Kind
 from vgyro.errors import ConfigError
 from vgyro.units import arw_deg_rt_h
 from vgyro.validation import Problem, StrictModel, parse_model
@@ -235,6 +235,8 @@ class Twin(StrictModel):
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"two recordings are named {name!r}")
+            if name in RESERVED:
+                raise ValueError(f"no recording can be named {name!r}: results keep a folder of that name")
         for recording in self.recordings:
             for gyro in dict.fromkeys([*self.gyros, *recording.gyros]):
                 _check_merged(self, recording, gyro)
@@ -243,7 +245,7 @@ class Twin(StrictModel):
 
 def parse_twin(text: str, source: str) -> Twin:
     """Validate the text of a twin file.  raises : InvalidFile, with every mistake at once"""
-    return parse_model(text, Twin, source)
+    return parse_model(text, Twin, source, {PARTIAL: True})
 
 
 def _check_merged(twin: Twin, recording: TwinRecording, gyro: str) -> None:
