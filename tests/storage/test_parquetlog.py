@@ -135,7 +135,7 @@ def test_what_is_not_a_log(read, values, tmp_path):
         read(tmp_path / "a.parquet")
     with pytest.raises(DataError, match="is empty: 0 bytes"):
         read(tmp_path / "b.parquet")
-    with pytest.raises(DataError, match="holds no .parquet file"):
+    with pytest.raises(DataError, match=r"holds no \.parquet file"):
         read(tmp_path / "empty")
     with pytest.raises(DataError, match="no such file"):
         read(tmp_path / "c.parquet")

@@ -77,6 +77,8 @@ class LogReader:
         self._in_step = 0
         self._in_step_s = 0.0
         self._next_row = 0
+        self._raw = 0.0  # time column of the last row
+        self._shifted = False  # true once the time column went back
 
     def __iter__(self) -> Iterator[Frames]:
         """Read row group by row group.  raises : DataError, Refused"""
@@ -174,9 +176,6 @@ class LogReader:
         else:
             time = raw - self._zero
         return time, np.where(step < 0, -1.0, step)
-
-    _shifted: bool = False
-    _raw: float = 0.0
 
     def _fresh(self, values: dict[str, np.ndarray], step: np.ndarray) -> np.ndarray:
         """bool [n]: false for a row with the time and the values of the row before."""

@@ -37,7 +37,9 @@ def main(task: Task) -> None:
             _say(f"{recording.name}: suspect: {reason}")
     except DataError as error:
         record = _record_of(error, board, recording)
-        write_table(task.output("frames"), columns_of(empty_frames(board)), "frames", provenance, _extra(record))
+        write_table(
+            task.output("frames"), columns_of(empty_frames(board)), "frames", provenance, _extra(board, recording)
+        )
         logging.exception("%s", error)
         _say(str(error))
     write_json(task.output("integrity"), {"recording": recording.name, **record.to_json()})
@@ -53,7 +55,7 @@ def decode(
 ) -> Integrity:
     """Stream a recording into a table of frames.  raises : DataError; then there is no table"""
     reader = open_recording(list(paths), recording, board, options)
-    with TableWriter(output, "frames", provenance, {"board": board.name}) as writer:
+    with TableWriter(output, "frames", provenance, _extra(board, recording)) as writer:
         for frames in reader:
             writer.append(columns_of(frames))
     if reader.integrity is None:
@@ -72,8 +74,8 @@ def _record_of(error: DataError, board: Board, recording: Recording) -> Integrit
     return unreadable_record(board, recording.rate_hz or board.rate_hz, error)
 
 
-def _extra(record: Integrity) -> dict[str, str]:
-    return {"board": record.board}
+def _extra(board: Board, recording: Recording) -> dict[str, str]:
+    return {"board": board.name, "values": recording.parquet.values if recording.parquet else "counts"}
 
 
 def _provenance(task: Task) -> Provenance:
