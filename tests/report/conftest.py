@@ -49,7 +49,8 @@ def board() -> dict[str, Any]:
 def manifest(simulated: bool = True) -> dict[str, Any]:
     plateaus = [{"start": 10.0 * k, "stop": 10.0 * k + 8, "rate": rate} for k, rate in enumerate((-100.0, 0.0, 100.0))]
     recordings = [
-        {"name": "cal", "kind": "calibration", "files": ["cal.bin"], "reference": {"kind": "plateaus", "plateaus": plateaus}, "axis": "x"},
+        {"name": "cal", "kind": "calibration", "files": ["cal.bin"], "axis": "x",
+         "reference": {"kind": "plateaus", "plateaus": plateaus}},
         {"name": "rest", "kind": "static", "files": ["rest.bin"]},
         {"name": "sine", "kind": "sinusoid", "files": ["sine.bin"], "axis": "x",
          "reference": {"kind": "sinusoid", "amplitude": 60.0, "frequency_hz": 0.1}},
@@ -60,24 +61,48 @@ def manifest(simulated: bool = True) -> dict[str, Any]:
 
 def integrity(name: str) -> dict[str, Any]:
     refused = name == "broken"
-    gaps = [{"start_s": 100.0, "stop_s": 100.5, "lost": 25, "cause": "line noise"}] if name == "rest" else []
-    damage = (
-        [{"file": "rest.bin", "first_byte": 1200, "last_byte": 1260, "cause": "checksum <&>"}] if name == "rest" else []
+    held = name == "rest"
+    gaps = (
+        [{"time": 100.0, "duration": 0.5, "frames_lost": 25, "cause": "damaged bytes", "ambiguous": False}]
+        if held
+        else []
     )
+    damage = (
+        [{"file": "rest.bin", "start": 1200, "stop": 1260, "frames_lost": 25, "cause": "checksum <&>"}] if held else []
+    )
+    channel = {"clipped": 0, "clipped_share": 0.0, "stuck_start": 0.0, "stuck_duration": 0.02}
+    odd = {
+        "g2": {**channel, "clipped": 17, "clipped_share": 0.0003},
+        "g3": {**channel, "stuck_start": 8.0, "stuck_duration": 2.5},
+    }
     return {
-        "status": "refused" if refused else "suspect" if name == "rest" else "good",
-        "reasons": ["only 12 % of its frames are good"] if refused else [],
-        "warnings": ["25 frames are lost"] if name == "rest" else [],
-        "files": [{"name": f"{name}.bin", "bytes": 123456, "sha256": "12" * 32}],
-        "frames": {"good": 60_000, "bad": 3, "lost": 25 if gaps else 0, "repeated": 0},
-        "good_share": 0.12 if refused else 0.9995,
-        "damage": damage,
-        "gaps": gaps,
-        "segments": 1 + len(gaps),
-        "channels": {"g2": {"clipped": 17, "stuck": 0}, "g3": {"clipped": 0, "stuck": 1}} if name == "rest" else {},
-        "rate": {"declared_hz": 50.0, "measured_hz": 49.987},
+        "board": "bench",
+        "status": "refused" if refused else "suspect" if held else "good",
+        "reasons": ["only 12 % of its frames are good"] if refused else ["gyro g3 repeats one value"] if held else [],
+        "warnings": ["the counter stood still in 3 frames"] if held else [],
+        "values": "counts",
+        "files": [
+            {
+                "name": f"{name}.bin",
+                "bytes": 123456,
+                "sha256": "12" * 32,
+                "compression": "none",
+                "content_bytes": 123456,
+            }
+        ],
+        "frames": {"good": 60_000, "bad": 3, "lost": 25 if held else 0, "repeated": 0, "good_share": 0.9995},
         "duration_s": 1200.0,
         "rate_hz": 50.0,
+        "declared_rate_hz": 50.0,
+        "measured_rate_hz": 49.987,
+        "rate_note": "measured 49.987 Hz, declared 50 Hz (-0.026 %)",
+        "segments": 1 + len(gaps),
+        "restarts": 0,
+        "gaps": gaps,
+        "gaps_not_listed": {"entries": 0, "frames_lost": 0},
+        "damage": damage,
+        "damage_not_listed": {"entries": 2 if held else 0, "bytes": 80, "frames_lost": 2},
+        "channels": {"g1": channel, **(odd if held else {})},
     }
 
 
@@ -87,7 +112,8 @@ def calibration() -> dict[str, Any]:
     ]
     measured = {
         "source": "measured", "scale": 0.0100123, "scale_low": 0.0100119, "scale_high": 0.0100127, "bias": 20.1,
-        "bias_low": 19.8, "bias_high": 20.4, "nonlinearity_ppm": 210.0, "floor_ppm": 160.0, "points": points, "note": "",
+        "bias_low": 19.8, "bias_high": 20.4, "note": "", "nonlinearity_ppm": 210.0,
+        "floor_ppm": 160.0, "points": points,
     }  # fmt: skip
     nominal = {
         "source": "nominal", "scale": 0.01, "scale_low": None, "scale_high": None, "bias": 0.0, "bias_low": None,
@@ -185,7 +211,8 @@ def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...]
     write_table(folder / "crosscheck.parquet", {
         "check": ["GARCH α", "DCC a", "Allan σ(1 s)"], "against": ["arch", "pymgarch", "allantools"],
         "window": [3, 3, -1], "series": [gyros[0], "array", gyros[0]], "ours": [0.05, 0.02, 0.04],
-        "theirs": [0.05, 0.02, 0.05 if failed_check else 0.04], "difference": [1e-7, 0.0, -0.01 if failed_check else 0.0],
+        "theirs": [0.05, 0.02, 0.05 if failed_check else 0.04],
+        "difference": [1e-7, 0.0, -0.01 if failed_check else 0.0],
         "tolerance": [1e-4] * checks, "unit": ["1", "1", "deg/s"], "passed": [True, True, not failed_check],
     }, "crosscheck", PROVENANCE)  # fmt: skip
     if recording == "rest":
@@ -296,8 +323,10 @@ def _write_volatility(folder: Path, gyros: tuple[str, ...]) -> None:
     rows = (count + 1) * len(gyros)
     wave = np.sin(np.arange(rows))
     garch |= {
-        "gyro": np.repeat(gyros, count + 1), "omega": 1e-5 + 0 * wave, "alpha": 0.05 + 0.02 * wave, "beta": 0.9 - 0.03 * wave,
-        "se_omega": 1e-6 + 0 * wave, "se_alpha": 0.02 + 0 * wave, "se_beta": 0.05 + 0 * wave, "log_likelihood": -500 + wave,
+        "gyro": np.repeat(gyros, count + 1), "omega": 1e-5 + 0 * wave, "alpha": 0.05 + 0.02 * wave,
+        "beta": 0.9 - 0.03 * wave,
+        "se_omega": 1e-6 + 0 * wave, "se_alpha": 0.02 + 0 * wave, "se_beta": 0.05 + 0 * wave,
+        "log_likelihood": -500 + wave,
         "status": np.where(wave < -0.8, "boundary", "converged"),
     }  # fmt: skip
     write_table(folder / "garch.parquet", garch, "garch", PROVENANCE)
@@ -305,8 +334,10 @@ def _write_volatility(folder: Path, gyros: tuple[str, ...]) -> None:
     wave = np.sin(np.arange(count + 1)) * 0.01 + (np.nan if single else 0)
     dcc: dict[str, Any] = {
         **place, "a": 0.03 + wave, "b": 0.9 - wave, "se_a": 0.01 + 0 * wave, "se_b": 0.05 + 0 * wave,
-        "se_a_hessian": 0.006 + 0 * wave, "se_b_hessian": 0.03 + 0 * wave, "log_likelihood": wave, "log_likelihood_ccc": wave,
-        "target": [[0.1] * (len(gyros) * (len(gyros) - 1) // 2)] * (count + 1), "statistic": 4 + wave, "p_value": 0.1 + 6 * wave,
+        "se_a_hessian": 0.006 + 0 * wave, "se_b_hessian": 0.03 + 0 * wave, "log_likelihood": wave,
+        "log_likelihood_ccc": wave,
+        "target": [[0.1] * (len(gyros) * (len(gyros) - 1) // 2)] * (count + 1), "statistic": 4 + wave,
+        "p_value": 0.1 + 6 * wave,
         "p_value_s": 0.08 + 6 * wave, "status": ["one gyro" if single else "converged"] * (count + 1),
     }  # fmt: skip
     write_table(folder / "dcc.parquet", dcc, "dcc", PROVENANCE)

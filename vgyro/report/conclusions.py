@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from vgyro.report.crosscheck import failures
-from vgyro.report.model import ArrayPart, DatasetPart, Value
+from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, Value, rows_of
 from vgyro.report.noise import method_labels
-from vgyro.report.numbers import duration, percent, significant
+from vgyro.report.numbers import percent, significant
 from vgyro.report.scale import nominal
 from vgyro.report.tables import Tone
 from vgyro.report.volatility import LEVEL_OF_TEST
@@ -21,16 +21,19 @@ FEWEST_GYROS = 3
 GYRO_FIGURES = ("sigma", "arw", "bias_drift")
 SIMPLE = ("average", "median", "inverse_variance_arw")
 MOST_LOST = 1e-4
+AT_REST_KINDS = ("static", "thermal", "free")
+REST_FACTORS = (("if_sigma", "1σ"), ("if_bias_drift", "bias drift"))
 STILL_FALLS = "the curve still falls"
 BAD_RULE = (
     f"A gyro is called bad where its 1σ, its fitted ARW or its bias drift at rest is more than {BAD_FACTOR:g} times "
     f"the median of its array ({FEWEST_GYROS} gyros or more)."
 )
 BEST_RULE = (
-    "Best method: the greatest improvement factor. DCC beats the simple baselines (average, median, fixed inverse "
-    "variance) where the interval of its improvement factor lies above the best of theirs; causal DCC only, because "
-    "in-sample weights have seen the samples that they weigh."
+    "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording "
+    "at rest. DCC beats the simple baselines (average, median, fixed inverse variance) where the lower limit of "
+    "its factor is above the best of theirs; causal DCC only, because in-sample weights have seen what they weigh."
 )
+ARCH_RULE = "ARCH of the level is called drift where the detrended series does not reject at 5 %."
 
 
 @dataclass(frozen=True)
@@ -67,18 +70,33 @@ class Best:
 def conclude(dataset: DatasetPart) -> list[Conclusion]:
     """All sentences, the most important first."""
     found = _gyro_sentences(dataset)
-    for array in dataset.arrays:
-        if len(array.gyros) > 1:
-            found += _method_sentences(array)
+    for array in main_arrays(dataset):
+        found += _rest_sentences(array)
+    found += _motion_sentences(dataset)
     found += _arch_sentences(dataset)
-    found += _limits(dataset)
-    return found
+    return found + limits(dataset)
+
+
+def at_rest(dataset: DatasetPart) -> list[ArrayPart]:
+    """Arrays of the recordings whose purpose includes rest."""
+    return [array for array in dataset.arrays if dataset.recording(array.recording).kind in AT_REST_KINDS]
+
+
+def main_arrays(dataset: DatasetPart) -> list[ArrayPart]:
+    """One array an axis: of the first static recording, else thermal, else free; the longest of its kind."""
+
+    def rank(array: ArrayPart) -> tuple[int, float]:
+        recording = dataset.recording(array.recording)
+        return AT_REST_KINDS.index(recording.kind), -float(recording.integrity.get("duration_s") or 0)
+
+    candidates = {axis: [array for array in at_rest(dataset) if array.axis == axis] for axis in dataset.board.axes}
+    return [min(arrays, key=rank) for arrays in candidates.values() if arrays]
 
 
 def bad_gyros(dataset: DatasetPart) -> list[BadGyro]:
     """Gyros far above the median of their array, each with its worst figure, the worst gyro first."""
     worst: dict[str, BadGyro] = {}
-    for array in dataset.arrays:
+    for array in at_rest(dataset):
         values = array.values()
         for metric in GYRO_FIGURES:
             for gyro, factor in _over_median(array, values, metric).items():
@@ -98,13 +116,14 @@ def _over_median(
     return {gyro: value / median for gyro, value in figures.items()} if median > 0 else {}
 
 
-def best_method(array: ArrayPart, metric: str) -> Best | None:
-    """The method with the greatest improvement factor of one figure."""
+def best_method(array: ArrayPart, metric: str, *, full_bandwidth: bool = False) -> Best | None:
+    """The method with the greatest improvement factor; full_bandwidth : of those that do not narrow the bandwidth."""
     labels = _labels(array)
+    limited = {(row["method"], row["definition"]) for row in array.methods() if np.isfinite(row["bandwidth_hz"])}
     found = [
         Best(labels[name], name[0], known[metric], array.axis, array.recording)
         for name, known in array.values().items()
-        if name in labels and metric in known and known[metric].known
+        if name in labels and metric in known and known[metric].known and not (full_bandwidth and name in limited)
     ]
     return max(found, key=lambda best: best.factor.value, default=None)
 
@@ -117,35 +136,47 @@ def _labels(array: ArrayPart) -> dict[tuple[str, str], str]:
 def _gyro_sentences(dataset: DatasetPart) -> list[Conclusion]:
     found = []
     bad = bad_gyros(dataset)
-    tested = {gyro for array in dataset.arrays if len(array.gyros) >= FEWEST_GYROS for gyro in array.gyros}
-    for one in bad:
-        title = dataset.figures[one.metric].title if one.metric in dataset.figures else one.metric
-        text = f"Gyro {one.gyro} (axis {one.axis}) is bad: its {title} is {significant(one.factor, 2)} times the median"
-        found.append(Conclusion(f"{text} of its array in {one.recording}.", "bad", f"{one.recording}-{one.axis}"))
+    tested = {gyro for array in at_rest(dataset) if len(array.gyros) >= FEWEST_GYROS for gyro in array.gyros}
     for axis in dataset.board.axes:
         members = [gyro.name for gyro in dataset.board.array(axis)]
-        if set(members) <= tested and not any(one.axis == axis for one in bad):
-            words = f"All {len(members)} gyros of axis {axis} are healthy by that rule."
-            found.append(Conclusion(words, "good"))
+        mine = [one for one in bad if one.axis == axis]
+        if mine:
+            listed = "; ".join(_bad_words(dataset, one) for one in mine)
+            verb = "is bad" if len(mine) == 1 else "are bad"
+            text = f"Axis {axis}: {len(mine)} of {len(members)} gyros {verb}, by the factor over the median: {listed}."
+            found.append(Conclusion(text, "bad", f"{mine[0].recording}-{axis}"))
+        elif set(members) <= tested:
+            found.append(Conclusion(f"Axis {axis}: all {len(members)} gyros are healthy.", "good", f"axis-{axis}"))
     return found
 
 
-def _method_sentences(array: ArrayPart) -> list[Conclusion]:
-    found = []
+def _bad_words(dataset: DatasetPart, bad: BadGyro) -> str:
+    title = dataset.figures[bad.metric].title if bad.metric in dataset.figures else bad.metric
+    return f"{bad.gyro} ({title} {significant(bad.factor, 2)}× in {bad.recording})"
+
+
+def _rest_sentences(array: ArrayPart) -> list[Conclusion]:
     place = f"axis {array.axis}, {array.recording}"
-    for metric, words in (("if_bias_drift", "bias drift"), ("if_sigma", "1σ")):
+    parts = []
+    for metric, words in REST_FACTORS:
         best = best_method(array, metric)
         if best is not None:
-            sure = "" if _significant(best.factor) else ": not significant, the interval holds 1"
-            figure = f"improvement factor {interval(best.factor)}{sure}"
-            text = f"By {words} the best method ({place}) is {best.label}, {figure}."
-            found.append(Conclusion(text, "", array.anchor))
-            found += [Conclusion(text, "", array.anchor) for text in _dcc_sentence(array, metric, words, place)]
+            parts.append(f"by {words} {best.label}, improvement factor {_factor(best.factor)}")
+            free = best_method(array, metric, full_bandwidth=True)
+            if free is not None and free.label != best.label:
+                parts[-1] += f" (without narrowing the bandwidth: {free.label}, {_factor(free.factor)})"
+    if not parts:
+        return []
+    found = [Conclusion(f"Best method at rest ({place}): {'; '.join(parts)}.", "", array.anchor)]
+    compared = [text for metric, words in REST_FACTORS if (text := _dcc_words(array, metric, words))]
+    if compared:
+        found.append(Conclusion(f"Causal DCC ({place}) {'; '.join(compared)}.", "", array.anchor))
     return found
 
 
-def _significant(value: Value) -> bool:
-    return not value.low <= 1 <= value.high
+def _factor(value: Value) -> str:
+    holds_one = value.low <= 1 <= value.high
+    return interval(value) + (", not significant: the interval holds 1" if holds_one else "")
 
 
 def interval(value: Value) -> str:
@@ -156,7 +187,7 @@ def interval(value: Value) -> str:
     return text
 
 
-def _dcc_sentence(array: ArrayPart, metric: str, words: str, place: str) -> list[str]:
+def _dcc_words(array: ArrayPart, metric: str, words: str) -> str:
     labels = _labels(array)
     known = {
         name: values[metric]
@@ -166,63 +197,90 @@ def _dcc_sentence(array: ArrayPart, metric: str, words: str, place: str) -> list
     simple = [name for name in known if name[0] in SIMPLE]
     dcc = [name for name in known if name[0] == "dcc_causal"]
     if not simple or not dcc:
-        return []
+        return ""
     baseline = max(simple, key=lambda name: known[name].value)
     ours = max(dcc, key=lambda name: known[name].value)
-    figures = f"{interval(known[ours])} against {significant(known[baseline].value)} of {labels[baseline]}"
     verdict = "beats" if known[ours].low > known[baseline].value else "does not beat"
-    return [f"By {words} causal DCC {verdict} the simple baselines ({place}): {labels[ours]} reaches {figures}."]
+    figures = f"{interval(known[ours])} with definition {ours[1]} against {significant(known[baseline].value)}"
+    return f"{verdict} the simple baselines by {words}: {figures} of {labels[baseline]}"
+
+
+def _motion_sentences(dataset: DatasetPart) -> list[Conclusion]:
+    found = []
+    for array in dataset.arrays:
+        labels = _labels(array)
+        errors = {
+            name: values["error_sigma"]
+            for name, values in array.values().items()
+            if name in labels and "error_sigma" in values and values["error_sigma"].known
+        }
+        if errors:
+            best = min(errors, key=lambda name: errors[name].value)
+            text = (
+                f"In motion (axis {array.axis}, {array.recording}) the least error 1σ is {interval(errors[best])} deg/s"
+            )
+            against = (
+                f", against {significant(errors['average', ''].value)} of the average"
+                if ("average", "") in errors
+                else ""
+            )
+            found.append(Conclusion(f"{text}, by {labels[best]}{against}.", "", array.anchor))
+    return found
 
 
 def _arch_sentences(dataset: DatasetPart) -> list[Conclusion]:
     found = []
-    for array in dataset.arrays:
-        table = array.volatility.get("level", {}).get("arch_lm")
-        if table is None:
-            continue
-        shares = {}
-        for series in ("level", "detrended"):
-            mine = (table["series"] == series) & (table["status"] == "ok")
-            shares[series] = (int((table["p_value"][mine] < LEVEL_OF_TEST).sum()), int(mine.sum()))
-        (raw, tested), (left, _) = shares["level"], shares["detrended"]
-        if not tested or not raw:
-            continue
-        what = "mostly drift" if left < raw / 2 else "more than drift"
-        text = (
-            f"ARCH-LM (axis {array.axis}, {array.recording}) rejects for {raw} of {tested} gyros on the level and for "
-            f"{left} on the detrended series: the “ARCH effect” of the level is {what}."
-        )
-        found.append(Conclusion(text, "", array.anchor))
+    for recording in dataset.recordings:
+        raw: list[str] = []
+        left: list[str] = []
+        tested = 0
+        for array in recording.arrays:
+            table = array.volatility.get("level", {}).get("arch_lm", {})
+            for row in rows_of(table):
+                if row["status"] == "ok":
+                    rejects = row["p_value"] < LEVEL_OF_TEST
+                    tested += row["series"] == "level"
+                    raw += [row["gyro"]] if rejects and row["series"] == "level" else []
+                    left += [row["gyro"]] if rejects and row["series"] == "detrended" else []
+        if raw:
+            verdict = "it is drift" if not left else f"it is more than drift for {', '.join(left)}"
+            text = f"ARCH effect of the level in {recording.name}: {len(raw)} of {tested} gyros; detrended: {len(left)}"
+            found.append(Conclusion(f"{text}; {verdict}.", "", recording.arrays[0].anchor))
     return found
 
 
-def _limits(dataset: DatasetPart) -> list[Conclusion]:
+def limits(dataset: DatasetPart) -> list[Conclusion]:
+    """What limits the result: nominal scale, refused recordings, lost frames, too little data, failed checks."""
     found = []
     unmeasured = nominal(dataset)
     if unmeasured:
         whose = "every gyro" if len(unmeasured) == len(dataset.board.gyros) else ", ".join(unmeasured)
-        found.append(
-            Conclusion(
-                f"Nominal scale for {whose}: absolute figures carry the data sheet's error.", "warn", "calibration"
-            )
-        )
+        words = f"Nominal scale for {whose}: absolute figures carry the data sheet's error; factors do not."
+        found.append(Conclusion(words, "warn", "calibration"))
     for recording in dataset.recordings:
-        if not recording.usable:
-            reasons = "; ".join(recording.integrity.get("reasons") or ["no reason given"])
-            found.append(Conclusion(f"Recording {recording.name} was refused: {reasons}.", "bad", "recordings"))
-            continue
-        frames = recording.integrity.get("frames") or {}
-        missing = (frames.get("lost") or 0) + (frames.get("bad") or 0)
-        total = missing + (frames.get("good") or 0)
-        if total and missing / total > MOST_LOST:
-            text = f"{recording.name} lacks {percent(missing / total, 2)} of its frames; no figure bridges a gap."
-            found.append(Conclusion(text, "warn", "recordings"))
-    found += [_too_short(array, names) for array in dataset.arrays if (names := _falling(array))]
+        found += _incomplete(recording)
+        falling = [gyro for array in recording.arrays for gyro in _falling(array)]
+        if falling and recording.kind in AT_REST_KINDS:
+            everyone = len(falling) == sum(len(array.gyros) for array in recording.arrays)
+            whose = "all gyros" if everyone else ", ".join(falling)
+            text = f"{recording.name} is too short for the floor of {whose}: the Allan curve still falls at its end"
+            found.append(Conclusion(f"{text}, so bias drift is an upper limit.", "warn", recording.arrays[0].anchor))
     for array in dataset.arrays:
         if failed := failures(array):
             text = f"{failed} cross-check comparisons failed (axis {array.axis}, {array.recording})."
             found.append(Conclusion(text, "bad", array.anchor))
     return found
+
+
+def _incomplete(recording: RecordingPart) -> list[Conclusion]:
+    if not recording.usable:
+        reasons = "; ".join(reason.rstrip(".") for reason in recording.integrity["reasons"])
+        return [Conclusion(f"Recording {recording.name} was refused: {reasons}.", "bad", "recordings")]
+    frames = recording.integrity["frames"]
+    if 1 - frames["good_share"] > MOST_LOST:
+        text = f"{recording.name} lacks {percent(1 - frames['good_share'], 2)} of its frames; no figure bridges a gap."
+        return [Conclusion(text, "warn", "recordings")]
+    return []
 
 
 def _falling(array: ArrayPart) -> list[str]:
@@ -232,17 +290,3 @@ def _falling(array: ArrayPart) -> list[str]:
         for gyro in array.gyros
         if "bias_drift" in values.get((gyro, ""), {}) and STILL_FALLS in values[gyro, ""]["bias_drift"].note
     ]
-
-
-def _too_short(array: ArrayPart, names: Sequence[str]) -> Conclusion:
-    whose = "all gyros" if len(names) == len(array.gyros) else ", ".join(names)
-    text = (
-        f"{array.recording} is too short for the floor of {whose} on axis {array.axis}: the Allan curve still falls at "
-        "its end, and bias drift is an upper limit."
-    )
-    return Conclusion(text, "warn", array.anchor)
-
-
-def hours_of(dataset: DatasetPart) -> str:
-    """Length of all usable recordings together."""
-    return duration(sum(float(part.integrity.get("duration_s") or 0) for part in dataset.recordings if part.usable))

@@ -6,7 +6,17 @@ from typing import Any
 
 from markupsafe import Markup
 
-from vgyro.report.conclusions import BAD_RULE, BEST_RULE, Best, Conclusion, bad_gyros, best_method, conclude
+from vgyro.report.conclusions import (
+    ARCH_RULE,
+    BAD_RULE,
+    BEST_RULE,
+    Best,
+    Conclusion,
+    bad_gyros,
+    best_method,
+    conclude,
+    main_arrays,
+)
 from vgyro.report.conventions import conventions_part, provenance_part
 from vgyro.report.crosscheck import crosscheck_part
 from vgyro.report.html import heading, join, macro, paragraph
@@ -43,7 +53,7 @@ def render_dataset(dataset: DatasetPart) -> str:
 def _conclusions(found: list[Conclusion]) -> Markup:
     if not found:
         return paragraph("Nothing can be concluded: no recording could be analysed.", "bad")
-    return join(macro("conclusions", found=tuple(found)), paragraph(f"{BAD_RULE} {BEST_RULE}", "note"))
+    return join(macro("conclusions", found=tuple(found)), paragraph(f"{BAD_RULE} {BEST_RULE} {ARCH_RULE}", "note"))
 
 
 def _array_sections(dataset: DatasetPart) -> list[Section]:
@@ -106,7 +116,7 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
 
 
 def _best_of_all(dataset: DatasetPart) -> Best | None:
-    found = [best for array in dataset.arrays if (best := best_method(array, "if_bias_drift")) is not None]
+    found = [best for array in main_arrays(dataset) if (best := best_method(array, "if_bias_drift")) is not None]
     return max(found, key=lambda best: best.factor.value, default=None)
 
 

@@ -15,7 +15,7 @@ from vgyro.report.plots import Axis, Curve, curve_plot
 
 # What a first look needs; the rest is one click away.
 SHOWN = ("average", "inverse_variance_arw", "jiang_random_walk", "dcc_causal")
-SPECTRUM_POINTS = 500
+SPECTRUM_POINTS = 700
 GYROS, METHODS = "single gyros", "methods (the others are hidden at first: click to show them)"
 
 

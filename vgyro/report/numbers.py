@@ -6,6 +6,7 @@ import math
 
 MISSING = "—"
 THIN_SPACE = "\u2009"
+MOST_DECIMALS = 9
 MINUS = "\u2212"
 
 
@@ -20,6 +21,11 @@ def significant(value: float, digits: int = 3) -> str:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return _signed(mantissa) + "·10" + _superscript(int(exponent))
     return _grouped(value, max(0, digits - 1 - magnitude))
+
+
+def plain(value: float, digits: int = 6) -> str:
+    """A number as one would write it: at most `digits` significant digits, no zeros at the end."""
+    return _signed(f"{value:.{digits}g}") if math.isfinite(value) else MISSING
 
 
 def rounded(value: float, decimals: int) -> str:
@@ -38,7 +44,7 @@ def with_interval(value: float, low: float, high: float) -> tuple[str, str]:
         return significant(value), ""
     step = math.floor(math.log10((high - low) / 2))
     decimals = 1 - step
-    if decimals > 6 or abs(value) >= 1e7:
+    if decimals > MOST_DECIMALS or abs(value) >= 1e7:
         return significant(value), f"{significant(low)} … {significant(high)}"
     decimals = max(0, decimals)
     return _grouped(value, decimals), f"{_grouped(low, decimals)} … {_grouped(high, decimals)}"

@@ -32,6 +32,7 @@ class Curve:
     low, high : interval at each point, drawn as a thin bar;  colour : number in the palette, dashes follow from it
     width : px;  line, points : whether the points are joined, whether each is marked;  visible : shown from the start
     group : heading in the legend;  ink : the colour of text, for the curve that the others are held against
+    behind : a curve with more of it is drawn first, so that a wide one does not hide the others
     """
 
     name: str
@@ -47,6 +48,7 @@ class Curve:
     line: bool = True
     visible: bool = True
     group: str = ""
+    behind: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ def curve_plot(
     _mark_spans(plot, spans)
     _mark_levels(plot, levels)
     sources = _sources(curves)
-    lines = [_draw(plot, curve, source) for curve, source in zip(curves, sources, strict=True)]
+    order = sorted(range(len(curves)), key=lambda index: -curves[index].behind)
+    lines = [_draw(plot, curves[index], sources[index]) for index in order]
     _add_hover(plot, [line for line in lines if line is not None], x, y)
     item = {"json": _escaped(_as_json(plot, identifier)), "height": height}
     legend = _legend(curves) if len(curves) > 1 else ()
@@ -86,6 +89,7 @@ def curve_plot(
 
 
 def _empty(x: Axis, y: Axis, height: int) -> figure:
+    from bokeh.models import BasicTickFormatter
     from bokeh.plotting import figure
 
     plot = figure(
@@ -113,6 +117,8 @@ def _empty(x: Axis, y: Axis, height: int) -> figure:
         axis.axis_label_text_color = axis.major_label_text_color = MUTED
         axis.axis_line_color = axis.major_tick_line_color = MUTED
         axis.minor_tick_line_color = None
+        if isinstance(axis.formatter, BasicTickFormatter):
+            axis.formatter.power_limit_low, axis.formatter.power_limit_high = -5, 6
     for grid in plot.grid:
         grid.grid_line_color = GRID
     return plot

@@ -9,11 +9,13 @@ from markupsafe import Markup
 
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import DatasetPart, RecordingPart
-from vgyro.report.numbers import MISSING, count, duration, percent, significant
+from vgyro.report.numbers import MISSING, count, duration, percent, plain
 from vgyro.report.tables import Cell, Column, Row, Tone, render_table
 
 MOST_LISTED = 50
-TONES: dict[str, Tone] = {"good": "good", "ok": "good", "suspect": "warn", "refused": "bad"}
+MOST_NAMED = 8
+STUCK_S = 1.0
+TONES: dict[str, Tone] = {"good": "good", "suspect": "warn", "refused": "bad"}
 COLUMNS = (
     Column("recording", numeric=False),
     Column("kind", numeric=False),
@@ -31,60 +33,65 @@ COLUMNS = (
 
 def recordings_part(dataset: DatasetPart) -> Markup:
     """Table of the recordings, why one was refused or is suspect, and the damage in detail."""
-    table = render_table(COLUMNS, [_row(recording) for recording in dataset.recordings])
+    longest = float(dataset.options.get("integrity", {}).get("stuck_s", STUCK_S))
+    table = render_table(COLUMNS, [_row(recording, longest) for recording in dataset.recordings])
     return join(table, *(_remarks(recording) for recording in dataset.recordings), *map(_detail, dataset.recordings))
 
 
-def _row(recording: RecordingPart) -> Row:
+def _row(recording: RecordingPart, longest: float) -> Row:
     record = recording.integrity
-    status = str(record.get("status", MISSING))
-    frames = record.get("frames") or {}
-    rate = record.get("rate") or {}
+    status = str(record["status"])
+    frames = record["frames"]
+    gaps = len(record["gaps"]) + record["gaps_not_listed"]["entries"]
+    measured = record["measured_rate_hz"]
     cells = (
         Cell(recording.name),
         Cell(recording.kind),
         Cell(status, tone=TONES.get(status, "")),
-        Cell(duration(_number(record.get("duration_s")))),
-        *(_count(frames.get(name)) for name in ("good", "bad", "lost")),
-        _count(len(record.get("gaps") or [])),
-        Cell(significant(_number(rate.get("declared_hz", record.get("rate_hz"))), 6)),
-        Cell(significant(_number(rate.get("measured_hz")), 6), hint="by the board's own clock, where it has one"),
-        Cell(channel_words(record.get("channels") or {})),
+        Cell(duration(float(record["duration_s"]))),
+        *(Cell(count(frames[name])) for name in ("good", "bad", "lost")),
+        Cell(count(gaps), _longest_gap(record["gaps"])),
+        Cell(plain(float(record["declared_rate_hz"]))),
+        Cell(MISSING if measured is None else plain(float(measured)), hint=str(record["rate_note"])),
+        Cell(channel_words(record["channels"], longest)),
     )
     return Row(cells)
 
 
-def _number(value: Any) -> float:
-    return float("nan") if value is None else float(value)
+def _longest_gap(gaps: list[Mapping[str, Any]]) -> str:
+    known = [gap["duration"] for gap in gaps if gap["duration"] is not None]
+    return f"longest {duration(max(known))}" if known else ""
 
 
-def _count(value: Any) -> Cell:
-    return Cell(MISSING, tone="muted", hint="not known for this kind of file") if value is None else Cell(count(value))
-
-
-def channel_words(channels: Mapping[str, Any]) -> str:
-    """Channels that are clipped or stuck, in words."""
-    words = []
-    for name, record in channels.items():
-        clipped, stuck = record.get("clipped"), record.get("stuck")
-        share = record.get("clipped_share")
-        if clipped:
-            words.append(f"{name}: {count(clipped)} clipped" + (f" ({percent(share, 2)})" if share is not None else ""))
-        if stuck:
-            times = len(stuck) if isinstance(stuck, list | tuple) else stuck
-            words.append(f"{name}: stuck {times} {'time' if times == 1 else 'times'}")
+def channel_words(channels: Mapping[str, Any], longest: float = STUCK_S) -> str:
+    """Channels that are clipped, or repeat one value for more than `longest` s, in words."""
+    clipped = [
+        f"{name} ({count(record['clipped'])}, {percent(record['clipped_share'], 2)})"
+        for name, record in channels.items()
+        if record["clipped"]
+    ]
+    stuck = [
+        f"{name} ({duration(record['stuck_duration'])} from {plain(record['stuck_start'])} s on)"
+        for name, record in channels.items()
+        if record["stuck_duration"] > longest
+    ]
+    words = [f"clipped: {_listed(clipped)}"] if clipped else []
+    words += [f"stuck: {_listed(stuck)}"] if stuck else []
     return "; ".join(words) or "none"
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def _remarks(recording: RecordingPart) -> Markup:
     record = recording.integrity
-    parts = [
-        paragraph(f"{recording.name} was refused: {reason}", "bad")
-        for reason in (record.get("reasons") or [] if not recording.usable else [])
-    ]
-    known = set(record.get("reasons") or []) if not recording.usable else set()
-    remarks = [*(record.get("reasons") or []), *(record.get("warnings") or [])]
-    parts += [paragraph(f"{recording.name}: {text}", "warn") for text in dict.fromkeys(remarks) if text not in known]
+    refused = [] if recording.usable else record["reasons"]
+    parts = [paragraph(f"{recording.name} was refused: {reason}", "bad") for reason in refused]
+    if recording.usable:
+        parts += [paragraph(f"{recording.name}: {reason}", "warn") for reason in record["reasons"]]
+    parts += [paragraph(f"{recording.name}: {text}", "note") for text in record["warnings"]]
     return join(*parts)
 
 
@@ -93,21 +100,26 @@ def _detail(recording: RecordingPart) -> Markup:
     record = recording.integrity
     parts = []
     for key, title in (("damage", "Damage"), ("gaps", "Gaps")):
-        entries = [entry for entry in record.get(key) or [] if isinstance(entry, Mapping)]
+        entries = record[key]
         if entries:
-            names = list(dict.fromkeys(name for entry in entries for name in entry))
-            columns = [
-                Column(name.replace("_", " "), numeric=not isinstance(entries[0].get(name), str)) for name in names
-            ]
-            rows = [[_plain(entry.get(name)) for name in names] for entry in entries[:MOST_LISTED]]
-            more = f", the first {MOST_LISTED} of {len(entries)}" if len(entries) > MOST_LISTED else ""
+            total = len(entries) + record[f"{key}_not_listed"]["entries"]
+            more = f", the first {MOST_LISTED} of {total}" if total > min(len(entries), MOST_LISTED) else ""
+            columns = [_detail_column(name, entries[0][name]) for name in entries[0]]
+            rows = [[_plain(entry[name]) for name in entries[0]] for entry in entries[:MOST_LISTED]]
             parts.append(render_table(columns, rows, f"{title}{more}", row_header=False, compact=True))
     if not parts:
         return Markup("")
     return details(f"Damage and gaps of {recording.name}", join(*parts))
 
 
+def _detail_column(name: str, example: Any) -> Column:
+    unit = {"time": "s", "duration": "s", "start": "byte", "stop": "byte"}.get(name, "")
+    return Column(name.replace("_", " "), unit, numeric=not isinstance(example, str | bool))
+
+
 def _plain(value: Any) -> str:
     if value is None:
         return MISSING
-    return significant(value, 6) if isinstance(value, float) else str(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return plain(value) if isinstance(value, float) else str(value)

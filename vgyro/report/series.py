@@ -48,12 +48,21 @@ def rates_plots(recording: RecordingPart, array: ArrayPart) -> Markup:
 def _rate_curves(rates: Table, array: ArrayPart) -> list[Curve]:
     values = np.column_stack([rates[name] for name in array.gyros])
     time, values = broken(*envelope(rates["time"], values))
-    curves = [Curve(name, name, time, values[:, i], colour=i, width=1) for i, name in enumerate(array.gyros)]
+    curves = [
+        Curve(name, name, time, values[:, i], colour=i, width=1, behind=_spread(values[:, i]))
+        for i, name in enumerate(array.gyros)
+    ]
     reference = rates.get(REFERENCE)
     if reference is not None and np.isfinite(reference).any():
         time, thinned = envelope(rates["time"], reference)
         curves.append(Curve(REFERENCE, REFERENCE, time, thinned, ink=True, width=1))
     return curves
+
+
+def _spread(values: np.ndarray) -> float:
+    """How wide a noisy curve is drawn: its mean step from one point to the next."""
+    steps = np.abs(np.diff(values))
+    return float(np.nanmean(steps)) if np.isfinite(steps).any() else 0.0
 
 
 def temperature_plot(recording: RecordingPart) -> Markup:

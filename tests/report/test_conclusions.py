@@ -1,0 +1,80 @@
+"""Conclusions follow from the figures by the stated rules; the figures here are made up to be on one side of a rule."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vgyro.report.conclusions import bad_gyros, best_method, conclude
+from vgyro.report.model import ArrayPart, DatasetPart
+from vgyro.tasks.common import Task
+from vgyro.tasks.report import read_dataset_part
+
+
+@pytest.fixture(scope="module")
+def dataset(report_task: Task) -> DatasetPart:
+    return read_dataset_part(report_task)
+
+
+def array_of(dataset: DatasetPart) -> ArrayPart:
+    return next(array for array in dataset.arrays if array.anchor == "rest-x")
+
+
+def with_metric(dataset: DatasetPart, method: str, metric: str, value: float) -> DatasetPart:
+    """The data set with one figure of the array rest-x changed."""
+    array = array_of(dataset)
+    table = {name: column.copy() for name, column in array.tables["metrics"].items()}
+    mask = (table["method"] == method) & (table["metric"] == metric)
+    assert mask.any()
+    for name in ("value", "low", "high"):
+        table[name][mask] = value
+    changed = replace(array, tables={**array.tables, "metrics": table})
+    recordings = tuple(
+        replace(part, arrays=tuple(changed if one is array else one for one in part.arrays))
+        for part in dataset.recordings
+    )
+    return replace(dataset, recordings=recordings)
+
+
+def test_the_noisy_gyro_is_named_with_its_factor(dataset: DatasetPart) -> None:
+    (bad,) = bad_gyros(dataset)
+    # Median of 0.05, 0.052, 0.048, 0.16 is 0.051.
+    assert (bad.gyro, bad.axis) == ("g4", "x")
+    assert bad.factor == pytest.approx(0.16 / 0.051)
+    assert any("g4" in one.text and one.tone == "bad" for one in conclude(dataset))
+
+
+def test_a_gyro_just_inside_the_rule_is_healthy(dataset: DatasetPart) -> None:
+    for metric in ("sigma", "arw", "bias_drift"):
+        values = array_of(dataset).values()
+        median = np.median([values[name, ""][metric].value for name in ("g1", "g2", "g3")])
+        dataset = with_metric(dataset, "g4", metric, 1.9 * median)
+    assert bad_gyros(dataset) == []
+    assert any(one.tone == "good" and "all 4 gyros" in one.text for one in conclude(dataset))
+
+
+def test_the_best_method_and_the_best_of_full_bandwidth(dataset: DatasetPart) -> None:
+    array = array_of(dataset)
+    assert best_method(array, "if_sigma").method == "jiang_random_walk"
+    assert best_method(array, "if_sigma", full_bandwidth=True).method == "dcc_in_sample"
+
+
+def test_causal_dcc_wins_only_with_its_whole_interval(dataset: DatasetPart) -> None:
+    texts = [one.text for one in conclude(dataset)]
+    (sentence,) = [text for text in texts if text.startswith("Causal DCC")]
+    assert "beats the simple baselines by 1σ" in sentence
+    assert "does not beat the simple baselines by bias drift" in sentence
+
+
+def test_limits_are_said(dataset: DatasetPart) -> None:
+    text = " ".join(one.text for one in conclude(dataset))
+    assert "Nominal scale for solo" in text
+    assert "Recording broken was refused: only 12 % of its frames are good." in text
+    assert "rest is too short for the floor of g1, g2" in text
+    assert "rest lacks 0.05\u2009% of its frames" in text
+
+
+def test_drift_is_not_called_arch(dataset: DatasetPart) -> None:
+    assert any("5 of 5 gyros; detrended: 0; it is drift" in one.text for one in conclude(dataset))
