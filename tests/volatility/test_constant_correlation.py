@@ -52,7 +52,7 @@ def test_where_it_is_not_defined():
 
 @pytest.mark.full
 def test_size(equicorrelated):
-    # A known simulated truth: at T = 360, s = 1 a nominal 5 % test rejects 1.8 % under chi²(s + 1) and 5.5 % under chi²(s).
+    # A known truth: at T = 360, s = 1 a nominal 5 % test rejects 1.8 % under chi²(s + 1) and 5.5 % under chi²(s).
     # 2000 runs: standard errors .3 % and .5 %.
     rng = np.random.default_rng(20150612)
     root = np.linalg.cholesky(equicorrelated(6, 0.12))

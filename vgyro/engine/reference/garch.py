@@ -21,9 +21,9 @@ ALPHA_NEAR_ZERO = 1e-3
 FLAT = 1e-12
 """A series that varies by less than this share of its size has no variance."""
 # Grid of starts: the best point of each half is handed to the optimiser, so that no start depends on another window.
-GRID_ALPHA = (0.02, 0.06, 0.15, 0.3)
-GRID_SLOW = (0.9, 0.95, 0.98, 0.995)
-GRID_FAST = (0.2, 0.4, 0.6, 0.8)
+GRID_ALPHA = (0.005, 0.02, 0.05, 0.1, 0.2, 0.35)
+GRID_SLOW = (0.8, 0.9, 0.95, 0.98, 0.995)
+GRID_FAST = (0.05, 0.2, 0.4, 0.6)
 OPTIONS = {"ftol": 1e-8, "maxiter": 300}
 
 

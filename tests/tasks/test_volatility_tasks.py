@@ -1,0 +1,202 @@
+"""The volatility tasks end to end: rates in, four tables out."""
+
+import numpy as np
+import pytest
+
+from vgyro.board import Board
+from vgyro.storage.schemas import SCHEMAS
+from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_table
+from vgyro.tasks import arch_lm, dcc, garch, weights
+from vgyro.tasks.common import Task
+from vgyro.volatility import fit_garch
+
+WINDOW, STEP = 120, 50
+
+
+def board_of(names):
+    channels = {"name": "rate", "type": "i16", "count": len(names), "at": 2}
+    frame = {"kind": "binary", "sync": "EB90", "length": 2 + 2 * len(names), "fields": [channels]}
+    frame["checksum"] = {"family": "none"}
+    field = "rate{}" if len(names) > 1 else "rate"
+    gyros = [
+        {"name": name, "field": field.format(index + 1), "axis": "z", "scale": 0.01} for index, name in enumerate(names)
+    ]
+    record = {"name": "b", "title": "b", "rate_hz": 10.0, "frame": frame, "gyros": gyros}
+    return Board.model_validate(record).model_dump(mode="json")
+
+
+def run_all(folder, values, segment=None, rest=None, definition="level", kind="static"):
+    """Write rates at 10 Hz whose 1 Hz block means are `values`, run the four tasks, read their tables."""
+    samples, n = values.shape
+    names = [f"g{i + 1}" for i in range(n)]
+    rates = np.repeat(values, 10, axis=0)
+    columns = {
+        "time": np.arange(10 * samples) / 10,
+        "segment": np.repeat(np.zeros(samples) if segment is None else segment, 10).astype(np.int32),
+        "at_rest": np.repeat(np.ones(samples) if rest is None else rest, 10).astype(bool),
+        **{name: rates[:, i] for i, name in enumerate(names)},
+    }
+    write_table(folder / "rates.parquet", columns, "rates", Provenance({}, "", ""), {"rate_hz": 10.0})
+    options = {
+        "board": board_of(names),
+        "axis": "z",
+        "definition": definition,
+        "kind": kind,
+        "analysis": {"engine": "reference", "volatility": {"window": WINDOW, "step": STEP}},
+    }
+    needs = {
+        "garch": ["rates"],
+        "dcc": ["rates", "garch"],
+        "arch_lm": ["rates", "garch"],
+        "weights": ["rates", "garch", "dcc"],
+    }
+    for task, module in (("garch", garch), ("dcc", dcc), ("arch_lm", arch_lm), ("weights", weights)):
+        inputs = {name: [folder / f"{name}.parquet"] for name in needs[task]}
+        module.main(Task(inputs, {task: folder / f"{task}.parquet"}, options, "code"))
+    return {task: read_columns(folder / f"{task}.parquet") for task in needs}
+
+
+def noise(samples, n, seed=0):
+    return 0.04 * np.random.default_rng(seed).standard_normal((samples, n))
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("volatility")
+    return folder, run_all(folder, noise(300, 3), definition="demeaned")
+
+
+def test_rows_of_every_table(tables):
+    # By hand: windows [0, 120), [50, 170), [100, 220), [150, 270) of 300 samples, and the whole record.
+    _, found = tables
+    assert found["garch"]["window"].tolist() == [number for number in (-1, 0, 1, 2, 3) for _ in range(3)]
+    assert found["dcc"]["window"].tolist() == [-1, 0, 1, 2, 3]
+    assert found["dcc"]["start"].tolist() == [0, 0, 50, 100, 150]
+    assert found["dcc"]["stop"].tolist() == [300, 120, 170, 220, 270]
+    assert found["dcc"]["time_start"].tolist() == [0, 0, 50, 100, 150]
+    assert found["arch_lm"]["series"].tolist() == ["level"] * 3 + ["detrended"] * 3 + ["standardised"] * 3
+    assert set(found["arch_lm"]["status"]) == {"ok"}
+    assert set(found["arch_lm"]["samples"]) == {300}
+    rows = found["weights"]
+    assert len(rows["time"]) == 4 * 300
+    assert set(zip(rows["model"], rows["mode"], strict=True)) == {
+        (model, mode) for model in ("dcc", "ccc") for mode in ("in_sample", "causal")
+    }
+
+
+def test_columns_are_declared_with_units(tables):
+    folder, found = tables
+    for name in found:
+        about = read_metadata(folder / f"{name}.parquet")
+        assert about["schema"] == name
+        assert about["version"] == SCHEMAS[name].version
+    assert read_metadata(folder / "garch.parquet")["units"]["omega"] == "(deg/s)²"
+
+
+def test_parameters_are_those_of_the_window(tables):
+    # Expected: the public function on the window cut out by hand.
+    _, found = tables
+    window = noise(300, 3)[50:170]
+    fit = fit_garch(window - window.mean(axis=0))
+    rows = found["garch"]["window"] == 1
+    np.testing.assert_allclose(found["garch"]["omega"][rows], fit.omega, rtol=1e-5)
+    assert found["garch"]["status"][rows].tolist() == fit.status.tolist()
+
+
+def test_weights_are_weights(tables):
+    rows = tables[1]["weights"]
+    w = np.column_stack([rows[f"w_g{i}"] for i in (1, 2, 3)])
+    np.testing.assert_allclose(w.sum(axis=1), 1, rtol=1e-12)
+    assert w.min() >= 0
+    waiting = rows["status"] == "no model yet"
+    assert waiting.sum() == 2 * WINDOW
+    assert set(rows["mode"][waiting]) == {"causal"}
+    np.testing.assert_array_equal(w[waiting], 1 / 3)
+    assert np.isnan(rows["sigma"][waiting]).all()
+    # The fused rate is never noisier than the best gyro, by construction of the weights.
+    best = np.min(np.column_stack([rows[f"sd_g{i}"] for i in (1, 2, 3)])[~waiting], axis=1)
+    assert np.all(rows["sigma"][~waiting] <= best * (1 + 1e-9))
+
+
+def test_same_bytes_again(tables, tmp_path):
+    folder, _ = tables
+    run_all(tmp_path, noise(300, 3), definition="demeaned")
+    for name in ("garch", "dcc", "arch_lm", "weights"):
+        assert (tmp_path / f"{name}.parquet").read_bytes() == (folder / f"{name}.parquet").read_bytes()
+
+
+def test_too_short_for_a_window_but_not_for_a_fit(tmp_path):
+    found = run_all(tmp_path, noise(60, 2))
+    assert found["garch"]["window"].tolist() == [-1, -1]
+    assert found["dcc"]["window"].tolist() == [-1]
+    assert np.isfinite(found["dcc"]["statistic"][0])
+    assert set(found["weights"]["status"]) == {"too short: 60 samples, window 120"}
+    np.testing.assert_array_equal(found["weights"]["w_g1"], 0.5)
+    assert set(found["arch_lm"]["status"]) == {"ok"}
+
+
+@pytest.mark.parametrize("samples", [0, 7])
+def test_far_too_short(tmp_path, samples):
+    values = np.concatenate([noise(samples, 2), noise(40, 2)])
+    rest = np.r_[np.ones(samples), np.zeros(40)]
+    # A few samples at rest, or none at all: then all 40 are used, which is too few too.
+    found = run_all(tmp_path, values, rest=rest, kind="free")
+    for name in ("garch", "dcc", "arch_lm"):
+        assert set(found[name]["status"]) == {"too short"}
+    assert np.isnan(found["arch_lm"]["statistic"]).all()
+    assert set(found["weights"]["status"]) == {f"too short: {samples or 40} samples, window 120"}
+
+
+def test_one_gyro(tmp_path):
+    found = run_all(tmp_path, noise(200, 1))
+    assert set(found["dcc"]["status"]) == {"one gyro"}
+    assert np.isnan(found["dcc"]["a"]).all()
+    np.testing.assert_array_equal(found["weights"]["w_g1"], 1.0)
+
+
+@pytest.mark.parametrize("definition", ["level", "difference", "residual"])
+def test_a_gyro_that_sticks(tmp_path, definition):
+    values = noise(300, 3)
+    values[100:230, 1] = 0.02
+    found = run_all(tmp_path, values, definition=definition)
+    stuck = (found["garch"]["window"] == 2) & (found["garch"]["gyro"] == "g2")
+    assert found["garch"]["status"][stuck].tolist() == ["no variance"]
+    rows = found["weights"]
+    out = rows["status"] == "without g2: no variance"
+    # In-sample: the newest 50 of window [100, 220); causal: the 50 after it; for two models.
+    assert out.sum() == 2 * (50 + 50)
+    np.testing.assert_array_equal(rows["w_g2"][out], 0)
+    np.testing.assert_allclose(rows["w_g1"][out] + rows["w_g3"][out], 1)
+
+
+def test_identical_gyros(tmp_path):
+    values = noise(200, 2)
+    values[:, 1] = values[:, 0]
+    found = run_all(tmp_path, values)
+    assert set(found["dcc"]["status"]) == {"not positive definite"}
+    assert np.isnan(found["dcc"]["p_value"]).all()
+    told = found["weights"]["status"] == "correlation not positive definite, taken as 0"
+    assert told.any()
+    np.testing.assert_allclose(found["weights"]["w_g1"][told], 0.5)
+
+
+def test_only_rest_is_used_where_there_is_rest(tmp_path):
+    values = noise(300, 2)
+    rest = np.ones(300)
+    rest[100:110] = 0
+    values[100:110] += 50.0
+    found = run_all(tmp_path, values, rest=rest, kind="free")
+    assert len(found["weights"]["time"]) == 4 * 290
+    # The longest stretch is 190 s long; windows [100, 220), [150, 270) lie in it.
+    assert found["dcc"]["start"].tolist() == [100, 100, 150]
+    assert found["garch"]["omega"].max() < 0.01
+    moving = run_all(tmp_path, values, rest=rest, kind="sinusoid")
+    assert len(moving["weights"]["time"]) == 4 * 300
+
+
+def test_drift_shows_in_the_level_and_not_when_detrended(tmp_path):
+    values = noise(600, 1) + 0.2 * np.sin(2 * np.pi * np.arange(600) / 300)[:, None]
+    found = run_all(tmp_path, values)["arch_lm"]
+    level, detrended, _ = found["statistic"]
+    assert level > 100
+    assert detrended < 12
