@@ -255,3 +255,18 @@ def test_shapes_that_do_not_fit(make_array):
 def test_the_guide_names_every_method(root):
     guide = (root / "docs/methods.md").read_text(encoding="utf-8")
     assert [name for name in METHODS if f"`{name}`" not in guide] == []
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_what_a_method_needs(make_array, name):
+    # `needs` is the whole truth: without it the method cannot run, without the other two it can.
+    array = make_array(4000, [0.05, 0.1, 0.1], weights=weights_for(4000, 3))
+    unknown = np.full(3, math.nan)
+    without = {
+        "arw": replace(array, noise=replace(array.noise, arw=unknown)),
+        "rrw": replace(array, noise=replace(array.noise, rrw=unknown)),
+        "weights": replace(array, weights={}),
+    }
+    for what, poorer in without.items():
+        (outcome,) = run_methods(poorer, PARAMETERS, select([name]), ("level",))
+        assert (outcome.fused is None) == (what in METHODS[name].needs)
