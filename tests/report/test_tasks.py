@@ -105,7 +105,7 @@ def test_the_headline_and_the_overview(page: str, report_task: Task, tmp_path: P
     headline = read_json(report_task.output("headline"))
     assert headline["status"] == "suspect"
     assert headline["refused"] == ["broken"]
-    assert headline["nominal_scale"]
+    assert headline["scale"] == "partly nominal"
     assert [one["gyro"] for one in headline["bad_gyros"]] == ["g4"]
     problem = "raw/x/dataset.yaml:3: boards: unknown key; did you mean 'board'?"
     task = Task(

@@ -104,7 +104,7 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
         "recordings": len(dataset.recordings),
         "refused": [part.name for part in dataset.recordings if not part.usable],
         "duration_s": sum(float(part.integrity.get("duration_s") or 0) for part in usable),
-        "nominal_scale": bool(nominal(dataset)),
+        "scale": _scale(dataset),
         "bad_gyros": [{"gyro": one.gyro, "axis": one.axis, "metric": one.metric, "factor": one.factor} for one in bad],
         "best": best and _record(best),
         "status": "refused"
@@ -113,6 +113,13 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
         if suspect or len(usable) < len(dataset.recordings)
         else "good",
     }
+
+
+def _scale(dataset: DatasetPart) -> str:
+    unmeasured = nominal(dataset)
+    if not unmeasured:
+        return "measured"
+    return "nominal" if len(unmeasured) == len(dataset.board.gyros) else "partly nominal"
 
 
 def _best_of_all(dataset: DatasetPart) -> Best | None:

@@ -65,7 +65,7 @@ def _row(record: Record) -> list[Cell]:
         Cell(duration(record["duration_s"])),
         _bad(record["bad_gyros"]),
         *_best(record["best"]),
-        Cell("nominal", tone="warn") if record["nominal_scale"] else Cell("measured"),
+        Cell(record["scale"], tone="" if record["scale"] == "measured" else "warn"),
         Cell(record["status"], tone=TONES[record["status"]]),
     ]
 

@@ -158,22 +158,26 @@ def _single(values: np.ndarray) -> np.ndarray:
 
 
 def _draw(plot: figure, curve: Curve, source: Any) -> Any:
+    """Bars, line and marks of a curve. returns : what answers to the pointer, None if there is neither line nor mark
+
+    Bare glyphs: plot.line() and its like make three more of each, for selections that no plot here has.
+    """
+    from bokeh.models import Line, Scatter, Segment
+
     colour = INK if curve.ink else series_mark(curve.colour)
-    common = {"source": source, "name": curve.name, "visible": curve.visible}
+    common = {"name": curve.name, "visible": curve.visible}
     if curve.low is not None and curve.high is not None:
-        plot.segment(
-            x0="x", x1="x", y0=f"{curve.name} low", y1=f"{curve.name} high", line_color=colour, line_width=1,
-            line_alpha=0.6, **common,
-        )  # fmt: skip
-    drawn = None
+        ends = {"y0": f"{curve.name} low", "y1": f"{curve.name} high"}
+        plot.add_glyph(source, Segment(x0="x", x1="x", **ends, line_color=colour, line_alpha=0.6), **common)
+    drawn = []
     if curve.line:
-        drawn = plot.line(
-            "x", curve.name, line_color=colour, line_width=curve.width, line_dash=series_dash(curve.colour), **common
-        )
+        dash = series_dash(curve.colour)
+        line = Line(x="x", y=curve.name, line_color=colour, line_width=curve.width, line_dash=dash)
+        drawn.append(plot.add_glyph(source, line, **common))
     if curve.points:
-        marks_drawn = plot.scatter("x", curve.name, size=4, line_color=colour, fill_color=PAPER, **common)
-        drawn = drawn or marks_drawn
-    return drawn
+        mark = Scatter(x="x", y=curve.name, size=4, line_color=colour, fill_color=PAPER)
+        drawn.append(plot.add_glyph(source, mark, **common))
+    return drawn[0] if drawn else None
 
 
 def _add_hover(plot: figure, renderers: list[Any], x: Axis, y: Axis) -> None:
