@@ -9,8 +9,8 @@ from snakemake.utils import min_version
 min_version("9.0")
 
 
-# Satisfied by the environment that `make` builds; a container image is not needed.
-container: None
+# The base that the environment of `make` is built on; it is only used when Snakemake is told to run containers.
+container: "docker://python:3.11-bookworm"
 
 
 include: "workflow/rules/common.smk"
