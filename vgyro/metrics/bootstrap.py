@@ -123,7 +123,7 @@ def resample(units: Units, replicates: int, seed: int, block: int | None = None)
     shifted = units.total - units.count[:, None] * centre
     squares = units.squares - 2 * centre * units.total + units.count[:, None] * centre**2
     mean = _block_sums(shifted, starts, block) / count
-    variance = _block_sums(squares, starts, block) / count - mean**2
+    variance = (_block_sums(squares, starts, block) - count * mean**2) / np.maximum(count - 1, 1)
     step_count = _block_sums(units.step_count[:, None], starts, block)
     with np.errstate(invalid="ignore", divide="ignore"):
         allan = _block_sums(units.steps, starts, block) / step_count

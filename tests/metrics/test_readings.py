@@ -1,0 +1,148 @@
+"""The papers' readings, improvement factors and noise from differences, on simulated truth."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vgyro.config import MetricsOptions
+from vgyro.metrics import (
+    FIGURES,
+    AllanCurve,
+    LowPass,
+    allan_deviation,
+    improvement_factor,
+    improvement_of_deviation,
+    make_units,
+    noise_coefficients,
+    noise_from_differences,
+    paper_readings,
+    resample,
+    spectral_density,
+    static_figures,
+)
+from vgyro.metrics.readings import bias_drift, rrw_read
+
+N, K = 6.17 / 60, 294.28 / 216000  # Jiang et al. (2012), table 2
+OPTIONS = MetricsOptions(bootstrap=200)
+
+
+def curve_of(function, seconds: float = 3600.0) -> AllanCurve:
+    tau = 2.0 ** (np.arange(-9, 3 * np.log2(seconds / 3)) / 3)
+    deviation = function(tau)
+    return AllanCurve(tau, deviation, 0.9 * deviation, 1.1 * deviation, 1.5 * seconds / tau, np.zeros(len(tau)))
+
+
+def test_white_noise_readings():
+    rate = N * np.sqrt(50.0) * np.random.default_rng(1).standard_normal(180_000)
+    curve = allan_deviation(rate, 50.0)
+    found = paper_readings(curve, spectral_density(rate, 50.0), noise_coefficients(curve), 50.0)
+    assert found["arw_1s"].low < 6.17 < found["arw_1s"].high
+    assert found["arw"].value == pytest.approx(6.17, rel=0.01)
+    assert found["noise_density"].value == pytest.approx(6.17 / 60, rel=0.02)
+    assert "two-sided" in found["noise_density"].note
+    assert found["rrw"].low == 0
+    assert "not shown to exist" in found["rrw"].note
+    assert set(found) <= set(FIGURES)
+
+
+def test_k_is_read_off_its_line():
+    # Closed form: a pure random walk of the rate, σ = K√(τ/3), read exactly; with white noise, read a little high.
+    pure = rrw_read(curve_of(lambda tau: K * np.sqrt(tau / 3)))
+    assert pure.value == pytest.approx(294.28, rel=1e-6)
+    assert pure.low < 294.28 < pure.high
+    mixed = rrw_read(curve_of(lambda tau: np.sqrt(N**2 / tau + K**2 * tau / 3)))
+    assert 294.28 < mixed.value < 1.15 * 294.28
+    flat = rrw_read(curve_of(lambda tau: N / np.sqrt(tau)))
+    assert flat.low == 0
+    assert "no rise" in flat.note
+
+
+def test_bias_drift_is_the_minimum():
+    # Closed form: σ² = N²/τ + K²τ/3 is lowest at τ = √3·N/K, σ² = 2NK/√3.
+    drift, tau = bias_drift(curve_of(lambda tau: np.sqrt(N**2 / tau + K**2 * tau / 3)))
+    assert drift.value == pytest.approx(3600 * math.sqrt(2 * N * K / math.sqrt(3)), rel=0.01)
+    assert tau.value == pytest.approx(math.sqrt(3) * N / K, rel=0.15)
+    assert drift.note == ""
+    falling, _ = bias_drift(curve_of(lambda tau: N / np.sqrt(tau)))
+    assert "still falls" in falling.note
+
+
+def test_average_of_white_gyros_gains_root_n():
+    rng = np.random.default_rng(2)
+    gyros = 0.02 + N * np.sqrt(50.0) * rng.standard_normal((90_000, 6))
+    values = np.column_stack([gyros, gyros.mean(axis=1)])
+    found = static_figures(values, 50.0, np.zeros(90_000, dtype=int), 6, [LowPass()] * 7, OPTIONS).readings
+    for name in ("if_sigma", "if_arw_1s", "if_bias_drift"):
+        factor = found[6][name]
+        assert factor.low <= math.sqrt(6) <= factor.high, name
+    assert found[6]["if_sigma"].value == pytest.approx(math.sqrt(6), rel=0.01)
+    assert "not significant" not in found[6]["if_arw_1s"].note
+    assert "not significant" in found[6]["if_mean"].note
+    assert "if_sigma" not in found[0]
+    for row in found:
+        for name, reading in row.items():
+            assert math.isnan(reading.low) or reading.low <= reading.value <= reading.high, name
+
+
+def test_coverage_of_the_factor():
+    # White gyros, true factor 2: 95 % limits hold it in 86 % of 100 runs at least.
+    inside = 0
+    for seed in range(100):
+        gyros = np.random.default_rng(seed).standard_normal((600, 4))
+        drawn = resample(make_units(np.column_stack([gyros, gyros.mean(axis=1)]), 1.0), 150, seed).sigma
+        found = np.column_stack([gyros, gyros.mean(axis=1)]).std(axis=0, ddof=1)
+        factor = improvement_factor(found[:4], found[4], drawn[:, :4], drawn[:, 4])
+        inside += factor.low <= 2 <= factor.high
+    assert inside >= 86
+
+
+def test_factor_takes_the_magnitude_of_a_mean():
+    replicates = np.array([[-1.0, 1.0], [-1.1, 0.9]])
+    factor = improvement_factor(np.array([-1.0, 1.0]), -0.5, replicates, np.array([-0.5, -0.4]))
+    assert factor.value == pytest.approx(2.0)
+    assert factor.note == ""
+    assert "zero" in improvement_factor(np.array([1.0]), 0.0, replicates[:, :1], np.zeros(2)).note
+
+
+def test_factor_of_a_deviation_by_f():
+    # Against scipy: the ratio of two equal variances is F distributed.
+    from scipy.stats import f
+
+    factor = improvement_of_deviation(np.array([2.0]), 1.0, np.array([8.0]), 12.0)
+    assert factor.low == pytest.approx(2 / math.sqrt(f.ppf(0.975, 8, 12)))
+    assert factor.high == pytest.approx(2 / math.sqrt(f.ppf(0.025, 8, 12)))
+
+
+def test_poses_do_not_enter_sigma():
+    rng = np.random.default_rng(3)
+    segment = np.repeat(np.arange(10), 1500)
+    values = rng.standard_normal((15_000, 2)) + 5 * rng.standard_normal((10, 1))[segment]
+    found = static_figures(values, 50.0, segment, 2, [LowPass()] * 2, OPTIONS, poses=True).readings
+    assert found[0]["sigma"].value == pytest.approx(1.0, rel=0.02)
+    assert "pose" in found[0]["sigma"].note
+    joined = static_figures(values, 50.0, segment, 2, [LowPass()] * 2, OPTIONS).readings
+    assert joined[0]["sigma"].value > 2
+
+
+def test_constant_series_has_figures():
+    values = np.column_stack([np.full(3000, 0.5), np.random.default_rng(4).standard_normal(3000)])
+    found = static_figures(values, 50.0, np.zeros(3000, dtype=int), 1, [LowPass()] * 2, OPTIONS).readings
+    assert found[0]["sigma"].value == 0
+    assert found[0]["arw"].value == 0
+    assert found[0]["bias_drift"].value == 0
+    assert found[1]["if_sigma"].value == 0
+
+
+def test_noise_from_differences_under_motion():
+    # Known truth: common motion of 50 deg/s cancels; gyro 3 is three times as noisy.
+    rng = np.random.default_rng(5)
+    truth = np.array([1.0, 1.0, 3.0, 1.2]) * N
+    motion = 50 * np.sin(np.arange(30_000) / 40)
+    rate = motion[:, None] + truth * np.sqrt(50.0) * rng.standard_normal((30_000, 4))
+    found, _ = noise_from_differences(rate, 50.0)
+    np.testing.assert_allclose(found, truth, rtol=0.06)
+    one, _ = noise_from_differences(rate[:, :1], 50.0)
+    assert math.isnan(one[0])
+    two, _ = noise_from_differences(rate[:, :2], 50.0)
+    np.testing.assert_allclose(two, N, rtol=0.05)
