@@ -63,6 +63,13 @@ def test_ratio_limits_add_relative_widths_in_quadrature():
     assert (found.value, found.low, found.high) == pytest.approx((2.0, 1.9, 2.1))
 
 
+def test_a_paired_ratio_decides_by_itself():
+    rule = {"kind": "ratio", "paired": True, "means": "a over b", "of": A, "to": B, "below": 0.97}
+    found = outcome(rule, evidence(a=(0.9, 0.5, 1.4), b=(1.0, 0.6, 1.5)))
+    assert found.outcome == "holds"
+    assert "[" not in found.reason
+
+
 def test_two_sided_bounds():
     rule = {"kind": "ratio", "means": "a over b", "of": A, "to": B, "above": 0.9, "below": 1.1}
     assert outcome(rule, evidence(a=(1.0, 0.99, 1.01), b=(1.0, 0.99, 1.01))).outcome == "holds"

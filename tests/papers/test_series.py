@@ -6,19 +6,23 @@ import numpy as np
 import pytest
 
 from vgyro.config import MetricsOptions
-from vgyro.papers.series import series_figures, with_extremes
+from vgyro.papers.series import extremes, paired_ratios, series_figures
 
 SECONDS = 7200
 PLACE = {"recording": "static", "axis": "z"}
 
 
 @pytest.fixture(scope="module")
-def found():
+def series():
     """Three gyros of white noise 0.02, 0.04, 0.06 deg/s at 1 Hz with offsets, and their average."""
     rng = np.random.default_rng(7)
     gyros = rng.normal(size=(SECONDS, 3)) * (0.02, 0.04, 0.06) + (0.01, -0.03, 0.05)
-    values = np.column_stack([gyros, gyros.mean(axis=1)])
-    names = [("g1", ""), ("g2", ""), ("g3", ""), ("average", "")]
+    return [("g1", ""), ("g2", ""), ("g3", ""), ("average", "")], np.column_stack([gyros, gyros.mean(axis=1)])
+
+
+@pytest.fixture(scope="module")
+def found(series):
+    names, values = series
     return series_figures(PLACE, names, 3, values, np.zeros(SECONDS, dtype=int), 1.0, MetricsOptions(bootstrap=100))
 
 
@@ -54,8 +58,23 @@ def test_factors_are_eq_18(found):
 
 
 def test_extremes_leave_the_faulty_gyro_out_of_the_healthy_ones(found):
-    rows = with_extremes(found.metrics, ["g1", "g2", "g3"], "g3")
-    assert figure(rows, "best_single", "mean")["note"] == "that of g1"
-    worst = figure(rows, "worst_healthy", "mean")
-    assert worst["note"] == "that of g2"
-    assert 0 < worst["low"] < worst["value"] < worst["high"]
+    chosen = extremes(found.metrics, ["g1", "g2", "g3"], "g3")
+    assert chosen == {"best_single": ("g1", ""), "worst_healthy": ("g2", "")}
+
+
+def test_paired_ratios_know_that_the_noise_is_shared(series):
+    names, values = series
+    over = {"average": ("average", "")}
+    halved = np.column_stack([values, 0.5 * values[:, 3]])
+    rows = paired_ratios(
+        PLACE, [*names, ("half", "")], halved, np.zeros(SECONDS, dtype=int), 1.0, over, MetricsOptions(bootstrap=100)
+    )
+    for metric in ("mean", "sigma", "arw_1s"):
+        # The same noise at half the size: the ratio has no scatter at all.
+        row = figure(rows, "half", metric)
+        assert (row["value"], row["low"], row["high"]) == pytest.approx((0.5, 0.5, 0.5))
+        single = figure(rows, "g3", metric)
+        assert single["low"] < single["value"] < single["high"]
+    # 0.06 over the average's √(0.02² + 0.04² + 0.06²)/3 deg/s.
+    sigma = figure(rows, "g3", "sigma")
+    assert sigma["low"] < 0.18 / math.sqrt(0.0056) < sigma["high"]

@@ -56,9 +56,14 @@ class ValueRule(Bounded):
 
 
 class RatioRule(Bounded):
-    """One figure over another. The interval takes the two as independent; they share noise, so that it is too wide."""
+    """One figure over another. The interval takes the two as independent; they share noise, so that it is too wide.
+
+    paired : both are the same samples through filters that pass the slow part alike, so that they share nearly all
+             their scatter: the ratio itself decides
+    """
 
     kind: Literal["ratio"]
+    paired: bool = False
     of: Selection
     to: Selection
 
@@ -120,7 +125,7 @@ def _judge_rule(rule: Any, evidence: Evidence, implied: Mapping[str, float]) -> 
     if isinstance(rule, ImpliedRule):
         return _decide(rule, Ours(implied[rule.figure]))
     if isinstance(rule, RatioRule):
-        return _decide(rule, ratio(look_up(evidence, rule.of), look_up(evidence, rule.to)))
+        return _decide(rule, ratio(look_up(evidence, rule.of), look_up(evidence, rule.to), rule.paired))
     each = [key for key, value in rule.figure.items() if value == EACH]
     if not each:
         return _decide(rule, look_up(evidence, rule.figure))
@@ -159,15 +164,18 @@ def _all(parts: list[Verdict]) -> Verdict:
     return Verdict(HOLDS, "; ".join(reasons))
 
 
-def ratio(of: Ours, to: Ours) -> Ours:
-    """One figure over another, limits by independent relative half-widths in quadrature; none if either has none."""
+def ratio(of: Ours, to: Ours, paired: bool = False) -> Ours:
+    """One figure over another, limits by independent relative half-widths in quadrature.
+
+    No limits if either figure has none, or if the two are `paired`.
+    """
     for part in (of, to):
         if not part.known:
             return part
     if to.value == 0.0:
         return Ours(math.nan, reason="the denominator is 0")
     value = of.value / to.value
-    if of.value <= 0.0 or to.value <= 0.0:
+    if paired or of.value <= 0.0 or to.value <= 0.0:
         return Ours(value)
     below = value * (1.0 - math.hypot((of.value - of.low) / of.value, (to.high - to.value) / to.value))
     above = value * (1.0 + math.hypot((of.high - of.value) / of.value, (to.value - to.low) / to.value))

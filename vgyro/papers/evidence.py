@@ -71,7 +71,7 @@ def look_up(evidence: Evidence, select: Mapping[str, Any]) -> Ours:
     if math.isnan(value):
         return Ours(math.nan, source=source, reason=note or f"{column} is not defined there")
     if absolute:
-        value, below, above = magnitude(value, below, above)
+        value, below, above = _magnitude(value, below, above)
     return Ours(value, below, above, unit, source, notes=(note,) if note and note != "ok" else ())
 
 
@@ -92,7 +92,7 @@ def with_single(rows: Iterable[dict[str, Any]], gyros: Sequence[str]) -> list[di
             continue
         figures = [tuple(_number(of_gyro[gyro].get(name)) for name in ("value", "low", "high")) for gyro in gyros]
         if metric == "mean" and recording in _AT_REST:
-            figures = [magnitude(*figure) for figure in figures]
+            figures = [_magnitude(*figure) for figure in figures]
         value = sum(figure[0] for figure in figures) / len(figures)
         below = math.sqrt(sum((figure[0] - figure[1]) ** 2 for figure in figures)) / len(figures)
         above = math.sqrt(sum((figure[2] - figure[0]) ** 2 for figure in figures)) / len(figures)
@@ -118,7 +118,7 @@ def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
 
 
-def magnitude(value: float, low: float, high: float) -> tuple[float, float, float]:
+def _magnitude(value: float, low: float, high: float) -> tuple[float, float, float]:
     """|x| of a figure with limits; where the limits hold 0 the lower one is 0."""
     if math.isnan(low) or math.isnan(high):
         return abs(value), math.nan, math.nan

@@ -115,9 +115,17 @@ class SampledFilter:
         pole = 2.0 * math.pi * self.sensor_hz
         return abs(self.gain) * density * math.sqrt(self.s * pole / (2.0 * (self.s + pole)))
 
-    def sine_error_sigma(self, amplitude: float, frequency_hz: float, noise: float, aligned: bool) -> float:
-        """1σ of output minus true sine: raw, or with the delay removed, with noise of 1σ `noise` on it."""
+    def sine_error_sigma(
+        self, amplitude: float, frequency_hz: float, noise: float, aligned: bool, chain: bool = False
+    ) -> float:
+        """1σ of output minus true sine: raw, or with the delay removed, with noise of 1σ `noise` on it.
+
+        chain : the gyro's pole and the one-sample delay of the printed eq. 14 change the sine too
+        """
         response = self.response(frequency_hz)
+        if chain:
+            turn = complex(math.cos(w := 2.0 * math.pi * frequency_hz * self.period), -math.sin(w))
+            response *= turn / complex(1.0, frequency_hz / self.sensor_hz)
         error = amplitude * abs(1.0 - (abs(response) if aligned else response))
         return math.hypot(error / math.sqrt(2.0), noise)
 

@@ -76,7 +76,7 @@ def _jiang(paper: Paper) -> Callable[[PublishedTable, str, str], Implied]:
 
 def _jiang_correlation(_paper: Paper, row: str, column: str) -> Implied:
     if row == column:
-        return Implied(1.0, "a correlation with itself")
+        return Implied(None, "1 by definition")
     return Implied(None, "measured on the authors' gyroscopes")
 
 
@@ -131,8 +131,13 @@ def _jiang_dynamic(paper: Paper, row: str, column: str) -> Implied:
     if column == "Sinusoidal rate: Amplitude":
         return Implied(SINE_DEG_S * abs(runs.response(SINE_HZ)), f"62.8 deg/s × |H(0.25 Hz)|, {bandwidth}")
     raw, aligned = (runs.sine_error_sigma(SINE_DEG_S, SINE_HZ, noise, flag) for flag in (False, True))
+    whole = runs.sine_error_sigma(SINE_DEG_S, SINE_HZ, noise, aligned=False, chain=True)
     delay = f"{1000.0 * runs.delay(SINE_HZ):.0f} ms"
-    return Implied(raw, f"sine minus its filtered self, and the noise; {aligned:.3f} with the delay of {delay} removed")
+    how = (
+        f"62.8 deg/s sine minus its filtered self, and the noise; {aligned:.3f} with the delay of {delay} removed; "
+        f"{whole:.2f} with the one-sample delay of eq. 14 and the gyro's own pole on top"
+    )
+    return Implied(raw, how)
 
 
 def _jiang_single(column: str, noise: float) -> Implied:

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from vgyro.config import MetricsOptions
-from vgyro.metrics import FIGURES, LowPass, Reading, static_figures
-from vgyro.papers.evidence import magnitude
+from vgyro.metrics import FIGURES, LowPass, Reading, make_units, resample, static_figures
 
 Name = tuple[str, str]
 Rows = list[dict[str, Any]]
-LIMITS = ("value", "low", "high")
 METRICS = ("mean", "sigma", "arw_1s", "bias_drift")
+PAIRED = ("mean", "sigma", "arw_1s")
 
 
 @dataclass(frozen=True)
@@ -56,16 +55,52 @@ def series_figures(
     return SeriesFigures(metrics, factors)
 
 
-def with_extremes(rows: Rows, gyros: Sequence[str], faulty: str) -> Rows:
-    """Add the smallest mean of a single gyro (`best_single`) and the largest of one without fault (`worst_healthy`)."""
-    means = [row for row in rows if row["metric"] == "mean" and row["method"] in gyros]
-    means = [
-        {**row, **dict(zip(LIMITS, magnitude(row["value"], row["low"], row["high"]), strict=True))} for row in means
-    ]
-    healthy = [row for row in means if row["method"] != faulty]
-    best, worst = min(means, key=lambda row: row["value"]), max(healthy, key=lambda row: row["value"])
-    named = (("best_single", best), ("worst_healthy", worst))
-    return [*rows, *({**row, "method": name, "note": f"that of {row['method']}"} for name, row in named)]
+def extremes(rows: Rows, gyros: Sequence[str], faulty: str) -> dict[str, Name]:
+    """The single gyro of the smallest mean (`best_single`) and that of the largest without fault (`worst_healthy`).
+
+    rows : SeriesFigures.metrics
+    """
+    size = {row["method"]: abs(row["value"]) for row in rows if row["metric"] == "mean" and row["method"] in gyros}
+    healthy = [gyro for gyro in gyros if gyro != faulty]
+    return {
+        "best_single": (min(gyros, key=size.__getitem__), ""),
+        "worst_healthy": (max(healthy, key=size.__getitem__), ""),
+    }
+
+
+def paired_ratios(
+    place: Mapping[str, str],
+    names: Sequence[Name],
+    values: np.ndarray,
+    stretch: np.ndarray,
+    rate_hz: float,
+    over: Mapping[str, Name],
+    options: MetricsOptions,
+) -> Rows:
+    """Mean (as a magnitude), 1σ and ARW at 1 s of every series over those of a few, with limits.
+
+    over : label → series to divide by;  the other arguments as in `series_figures`
+    Both series are resampled with the same blocks, so that the noise they share does not widen the limits. Bias drift
+    is not there: the minimum of a curve cannot be resampled by blocks.
+    """
+    sums = make_units(values, rate_hz, stretch)
+    drawn = resample(sums, options.bootstrap, options.seed)
+    replicates = dict(zip(PAIRED, (np.abs(drawn.mean), drawn.sigma, drawn.adev_1s), strict=True))
+    tails = [(1 - options.confidence) / 2, (1 + options.confidence) / 2]
+    # One block as long as the record is the record itself.
+    whole = resample(sums, 1, options.seed, len(sums.count))
+    figures = dict(zip(PAIRED, (np.abs(whole.mean[0]), whole.sigma[0], whole.adev_1s[0]), strict=True))
+    rows: Rows = []
+    for label, name in over.items():
+        to = list(names).index(name)
+        for index, (method, definition) in enumerate(names):
+            for metric in PAIRED:
+                drawn_ratio = replicates[metric][:, index] / replicates[metric][:, to]
+                low, high = (float(limit) for limit in np.quantile(drawn_ratio, tails))
+                value = float(figures[metric][index] / figures[metric][to])
+                about = {"method": method, "definition": definition, "over": label, "metric": metric}
+                rows.append({**place, **about, "value": value, "low": low, "high": high, "unit": "1", "note": ""})
+    return rows
 
 
 def _row(place: Mapping[str, str], name: Name, metric: str, figure: str, reading: Reading) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from vgyro.board import Board
 from vgyro.config import MetricsOptions, VolatilityOptions
 from vgyro.dataset import ConstantReference, Manifest
 from vgyro.papers import Evidence, with_single
-from vgyro.papers.series import series_figures, with_extremes
+from vgyro.papers.series import extremes, paired_ratios, series_figures
 from vgyro.storage.tables import read_columns
 from vgyro.tasks.measure import fused_series
 from vgyro.tasks.rates_file import read_array
@@ -24,6 +24,15 @@ Rows = list[dict[str, Any]]
 TWO_SIDED = 1.959964
 # Liu et al. (2015), section 5: the fourth gyro is faulty from 1000 s on, and its weight is near zero after 2500 s.
 FAULTY, STRETCHES = 4, {"before 1000 s": (0.0, 1000.0), "after 2500 s": (2500.0, math.inf)}
+
+# What the claims of Liu et al. (2015) compare their weights with.
+AGAINST = {
+    "average": ("average", ""),
+    "xue_2012": ("xue_2012", ""),
+    "chang_2012": ("chang_2012", ""),
+    "jiang_markov": ("jiang_markov", ""),
+    "ccc": ("ccc_in_sample", "level"),
+}
 
 
 def gather(
@@ -51,8 +60,12 @@ def gather(
         place = {"recording": static.parts[-3], "axis": static.parts[-2]}
         names, values, stretch, rate_hz = _block_series(static, gyros, volatility)
         figures = series_figures(place, names, len(gyros), values, stretch, rate_hz, metrics)
-        rows.setdefault("metrics_1hz", []).extend(with_extremes(figures.metrics, gyros, gyros[FAULTY - 1]))
+        over = {**AGAINST, **extremes(figures.metrics, gyros, gyros[FAULTY - 1])}
+        there = {label: name for label, name in over.items() if name in names}
+        rows.setdefault("metrics_1hz", []).extend(figures.metrics)
         rows.setdefault("factors_1hz", []).extend(figures.factors)
+        ratios = paired_ratios(place, names, values, stretch, rate_hz, there, metrics)
+        rows.setdefault("ratios_1hz", []).extend(ratios)
     return Evidence(rows, gyros)
 
 

@@ -87,7 +87,7 @@ def _table(comparison: Comparison) -> Markup:
         rows += _lines(comparison, row, columns, notes)
     heads = (
         tables.Column("", numeric=False),
-        *(tables.Column(column.name, column.unit or table.unit or "") for column in columns),
+        *(tables.Column(column.name, _unit(column.unit or table.unit).removeprefix(", ")) for column in columns),
     )
     parts = [tables.render_table(heads, rows, f"{table.where} of the paper", notes.texts, compact=True)]
     return html.join(*parts, html.paragraph(table.note, "note") if table.note else "")
