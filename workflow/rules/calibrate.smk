@@ -65,5 +65,5 @@ rule noise:
         options=stage("board", "metrics"),
         code=code("noise"),
     shell:
-        RUN + "noise --input rates {input.rates} --output noise {output.noise}"
+        "python -m vgyro.tasks.noise --input rates {input.rates} --output noise {output.noise}"
         " --options {params.options:q} --code {params.code} --log {log}"

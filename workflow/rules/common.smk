@@ -14,7 +14,6 @@ from vgyro.tasks.inputs_check import reference_file as logged_reference
 from vgyro.tasks.twins import load_twins
 
 PAPERS = ("jiang2012", "liu2015")
-RUN = "python -m vgyro.tasks."
 
 # One thread a job: Snakemake places the jobs on the cores, and one thread gives the same bytes everywhere.
 shell.prefix("export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1; ")
@@ -263,7 +262,7 @@ def index_command():
     there = [path for path in headlines if Path(path).exists()]
     return " ".join(
         [
-            f"{RUN}index --input headlines",
+            "python -m vgyro.tasks.index --input headlines",
             *map(shlex.quote, there),
             "--output page reports/index.html",
         ]

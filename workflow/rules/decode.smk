@@ -17,7 +17,7 @@ rule decode:
         options=stage("manifest", "board", "integrity"),
         code=code("decode"),
     shell:
-        RUN + "decode --input files {params.files:q} --output frames {output.frames}"
+        "python -m vgyro.tasks.decode --input files {params.files:q} --output frames {output.frames}"
         " --output integrity {output.integrity} --options {params.options:q} --code {params.code} --log {log}"
 
 

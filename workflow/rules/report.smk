@@ -53,7 +53,7 @@ rule index:
         options=json.dumps({"problems": PROBLEMS}),
         code=code("index"),
     shell:
-        RUN + "index --input headlines {input.headlines:q} --output page {output.page}"
+        "python -m vgyro.tasks.index --input headlines {input.headlines:q} --output page {output.page}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
 

@@ -15,7 +15,7 @@ rule garch:
         options=stage("board", "engine", "volatility"),
         code=code("garch"),
     shell:
-        RUN + "garch --input rates {input.rates}"
+        "python -m vgyro.tasks.garch --input rates {input.rates}"
         " --output garch {output.garch}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -38,7 +38,7 @@ rule dcc:
         options=stage("board", "engine", "volatility"),
         code=code("dcc"),
     shell:
-        RUN + "dcc --input rates {input.rates} --input garch {input.garch}"
+        "python -m vgyro.tasks.dcc --input rates {input.rates} --input garch {input.garch}"
         " --output dcc {output.dcc}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -61,7 +61,7 @@ rule arch_lm:
         options=stage("board", "engine", "volatility"),
         code=code("arch_lm"),
     shell:
-        RUN + "arch_lm --input rates {input.rates} --input garch {input.garch}"
+        "python -m vgyro.tasks.arch_lm --input rates {input.rates} --input garch {input.garch}"
         " --output arch_lm {output.arch_lm}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
