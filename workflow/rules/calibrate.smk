@@ -17,8 +17,7 @@ rule calibrate:
         options=stage("manifest", "board"),
         code=code("calibrate"),
     shell:
-        RUN
-        + "calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"
+        "python -m vgyro.tasks.calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"
         " --input references {input.references:q} --output calibration {output.calibration}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -42,8 +41,7 @@ rule convert:
         options=stage("manifest", "board", "rest"),
         code=code("convert"),
     shell:
-        RUN
-        + "convert --input frames {input.frames} --input calibration {input.calibration}"
+        "python -m vgyro.tasks.convert --input frames {input.frames} --input calibration {input.calibration}"
         " --input reference {input.reference:q} --output rates {output.rates}"
         " --options {params.options:q} --code {params.code} --log {log}"
 

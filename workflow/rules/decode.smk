@@ -38,6 +38,5 @@ checkpoint screen:
         options=stage("manifest"),
         code=code("screen"),
     shell:
-        RUN
-        + "screen --input integrity {input.integrity:q} --output screen {output.screen}"
+        "python -m vgyro.tasks.screen --input integrity {input.integrity:q} --output screen {output.screen}"
         " --options {params.options:q} --code {params.code} --log {log}"

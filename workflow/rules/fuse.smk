@@ -18,7 +18,6 @@ rule fuse:
         options=stage("board", "engine", "volatility", "fusion"),
         code=code("fuse"),
     shell:
-        RUN
-        + "fuse --input rates {input.rates} --input noise {input.noise} --input weights {input.weights:q}"
+        "python -m vgyro.tasks.fuse --input rates {input.rates} --input noise {input.noise} --input weights {input.weights:q}"
         " --output fused {output.fused} --output methods {output.methods}"
         " --options {params.options:q} --code {params.code} --log {log}"

@@ -20,8 +20,7 @@ rule measure:
         options=stage("board", "engine", "metrics"),
         code=code("measure"),
     shell:
-        RUN
-        + "measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods}"
+        "python -m vgyro.tasks.measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods}"
         " --output allan {output.allan} --output spectrum {output.spectrum} --output metrics {output.metrics} --output correlation {output.correlation}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -52,7 +51,6 @@ rule crosscheck:
         ),
         code=code("crosscheck"),
     shell:
-        RUN
-        + "crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
+        "python -m vgyro.tasks.crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
         " --output crosscheck {output.crosscheck}"
         " --options {params.options:q} --code {params.code} --log {log}"

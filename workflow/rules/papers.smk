@@ -20,8 +20,7 @@ rule papers_page:
         options=stage("manifest", "board", "volatility", "fusion", "metrics"),
         code=code("papers"),
     shell:
-        RUN
-        + "papers --input calibration {input.calibration} --input noise {input.noise:q}"
+        "python -m vgyro.tasks.papers --input calibration {input.calibration} --input noise {input.noise:q}"
         " --input artefacts {input.artefacts:q} --output page {output.page}"
         " --output table1 {output.table1} --output table2 {output.table2} --output table3 {output.table3}"
         " --options {params.options:q} --code {params.code} --log {log}"

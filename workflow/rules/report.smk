@@ -29,8 +29,7 @@ rule report:
         ),
         code=code("report"),
     shell:
-        RUN
-        + "report --input calibration {input.calibration} --input screen {input.screen}"
+        "python -m vgyro.tasks.report --input calibration {input.calibration} --input screen {input.screen}"
         " --input integrity {input.integrity:q} --input noise {input.noise:q} --input artefacts {input.artefacts:q}"
         " --output page {output.page} --output headline {output.headline}"
         " --options {params.options:q} --code {params.code} --log {log}"
@@ -75,6 +74,5 @@ rule verdict:
         options=json.dumps({"problems": PROBLEMS}),
         code=code("verdict"),
     shell:
-        RUN
-        + "verdict --input screens {input.screens:q} --input page {input.page} --output verdict {output.verdict}"
+        "python -m vgyro.tasks.verdict --input screens {input.screens:q} --input page {input.page} --output verdict {output.verdict}"
         " --options {params.options:q} --code {params.code} --log {log}"

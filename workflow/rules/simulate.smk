@@ -17,6 +17,5 @@ rule simulate:
         options=stage("board"),
         code=code("simulate"),
     shell:
-        RUN
-        + "simulate --input twin {input.twin} --output dump {output.dump} --output truth {output.truth}"
+        "python -m vgyro.tasks.simulate --input twin {input.twin} --output dump {output.dump} --output truth {output.truth}"
         " --output reference {output.reference} --options {params.options:q} --code {params.code} --log {log}"

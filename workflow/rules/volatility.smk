@@ -85,7 +85,6 @@ rule weights:
         options=stage("board", "engine", "volatility"),
         code=code("weights"),
     shell:
-        RUN
-        + "weights --input rates {input.rates} --input garch {input.garch} --input dcc {input.dcc}"
+        "python -m vgyro.tasks.weights --input rates {input.rates} --input garch {input.garch} --input dcc {input.dcc}"
         " --output weights {output.weights}"
         " --options {params.options:q} --code {params.code} --log {log}"
