@@ -13,9 +13,10 @@ import numpy as np
 
 from vgyro.board import Board
 from vgyro.config import Definition, VolatilityOptions
-from vgyro.errors import ConfigError, DataError
-from vgyro.storage.tables import read_columns, read_metadata
+from vgyro.errors import ConfigError
+from vgyro.storage.tables import read_columns
 from vgyro.tasks.common import Task
+from vgyro.tasks.rates_file import read_array
 from vgyro.volatility.series import Series, block_means
 from vgyro.volatility.stretches import Window, longest_stretch, stretches, windows
 from vgyro.volatility.windowed import MIN_SAMPLES, fitted_residuals
@@ -73,14 +74,11 @@ def open_series(task: Task) -> ArraySeries:
     analysis = task.options["analysis"]
     options = VolatilityOptions.model_validate(analysis.get("volatility", {}))
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
-    path = task.input("rates")
-    rates = read_columns(path, ["time", "segment", "at_rest", *gyros])
-    values = np.column_stack([rates[gyro] for gyro in gyros]).astype(float)
-    rest = rates["at_rest"].astype(bool)
+    rates = read_array(task.input("rates"), gyros, task.options["axis"])
+    rest = rates.at_rest
     in_motion = task.options.get("kind") in IN_MOTION or not rest.any()
-    rate_hz = sample_rate(path, rates["time"])
     used = None if in_motion else rest
-    series = block_means(values, rate_hz, options.rate_hz, rates["segment"], used, rates["time"])
+    series = block_means(rates.rate, rates.rate_hz, options.rate_hz, rates.segment, used, rates.time)
     found = windows(series.stretch, options.window, options.step)
     jobs = [(WHOLE, longest_stretch(series.stretch)), *enumerate(found)]
     logging.info(
@@ -98,16 +96,6 @@ def _definition(task: Task) -> Definition:
     if definition not in get_args(Definition):
         raise ConfigError(f"unknown definition {definition!r}", remedy=f"One of {', '.join(get_args(Definition))}")
     return definition
-
-
-def sample_rate(path: Path, time: np.ndarray) -> float:
-    """Sample rate of rates.parquet, Hz: as declared, else from its time stamps.  raises : DataError"""
-    declared = read_metadata(path).get("rate_hz")
-    if declared is not None:
-        return float(declared)
-    if len(time) < 2:
-        raise DataError(f"{len(time)} samples say nothing of the sample rate", str(path))
-    return 1.0 / float(np.median(np.diff(time)))
 
 
 def enough(window: Window) -> bool:
