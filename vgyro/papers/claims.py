@@ -142,8 +142,8 @@ def _decide(rule: Bounded, figure: Ours, of: str = "") -> Verdict:
         return Verdict(OPEN, f"{means} is missing ({figure.reason})")
     has_limits = not (math.isnan(figure.low) or math.isnan(figure.high))
     low, high = (figure.low, figure.high) if has_limits else (figure.value, figure.value)
-    limits = f" [{low:.3g}, {high:.3g}]" if has_limits else ""
-    reason = f"{means} is {figure.value:.3g}{limits}, and the claim needs {rule.needs()}"
+    limits = f" [{low:.4g}, {high:.4g}]" if has_limits else ""
+    reason = f"{means} is {figure.value:.4g}{limits}, and the claim needs {rule.needs()}"
     if (rule.above is None or low > rule.above) and (rule.below is None or high < rule.below):
         return Verdict(HOLDS, reason)
     if (rule.above is not None and high <= rule.above) or (rule.below is not None and low >= rule.below):

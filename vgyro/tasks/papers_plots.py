@@ -42,11 +42,9 @@ def figures(paper: str, gyros: Sequence[str], artefacts: Sequence[Path]) -> Mark
 def _allan(path: Path, gyros: Sequence[str], labels: dict[str, str]) -> Markup:
     table = read_columns(path)
     methods = [name for name in labels if name in table["series"]]
-    gyros = [
-        name for name in dict.fromkeys(table["series"]) if "_" not in name and "[" not in name and name not in labels
-    ]
     curves = []
-    for index, name in enumerate([*methods, *gyros]):
+    # The virtual gyroscopes are drawn last, over the single ones.
+    for index, name in enumerate([*gyros, *methods]):
         rows = table["series"] == name
         tau, y, low, high = (table[column][rows] for column in ("tau", "deviation", "low", "high"))
         virtual = name in labels
