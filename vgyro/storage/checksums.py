@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro.board import BinaryFrame, ByteOrder, Checksum
 
-Verifier = Callable[[np.ndarray], np.ndarray]
+Verifier = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def checksum(data: np.ndarray, rule: Checksum) -> np.ndarray:
@@ -31,36 +31,39 @@ def checksum(data: np.ndarray, rule: Checksum) -> np.ndarray:
 
 
 def verifier(frame: BinaryFrame) -> Verifier:
-    """Return a function: uint8 [n, length] → bool [n], true where the frame's checksum holds."""
+    """Return a function: buffer uint8 [m], places int64 [n] → bool [n], true where a frame that begins there is right.
+
+    Nothing is copied out of the buffer, so that a stretch that is all sync bytes costs no memory.
+    """
     rule = frame.checksum
     if rule.family == "none" or rule.span is None:
-        return lambda frames: np.ones(len(frames), dtype=bool)
+        return lambda _buffer, places: np.ones(len(places), dtype=bool)
     first, last = rule.span
     order = rule.byte_order or frame.byte_order
     if rule.family == "crc":
         # Made once: building the tables for every chunk would cost more than using them.
         zeros, tables = _crc_tables(rule, last - first)
 
-    def verify(frames: np.ndarray) -> np.ndarray:
+    def verify(buffer: np.ndarray, places: np.ndarray) -> np.ndarray:
         if rule.family == "crc":
-            found = np.full(len(frames), zeros, tables.dtype)
-            for place, table in enumerate(tables):
-                found ^= table[frames[:, first + place]]
+            found = np.full(len(places), zeros, tables.dtype)
+            for offset, table in enumerate(tables, first):
+                found ^= table[buffer[places + offset]]
         else:
-            found = checksum(frames[:, first:last], rule)
+            total = np.insert(np.cumsum(buffer, dtype=np.uint64), 0, np.uint64(0))
+            found = (total[places + last] - total[places + first]) & np.uint64(_mask(rule.width))
         if rule.at is None:
             return found == rule.equals
-        return found == stored_value(frames, rule.at, rule.width // 8, order)
+        return found == stored_value(buffer, places + rule.at, rule.width // 8, order)
 
     return verify
 
 
-def stored_value(frames: np.ndarray, at: int, size: int, order: ByteOrder) -> np.ndarray:
-    """Unsigned integer of `size` bytes at offset `at` of each row, uint64 [n]."""
-    value = np.zeros(len(frames), dtype=np.uint64)
-    places = range(at, at + size) if order == "big" else range(at + size - 1, at - 1, -1)
-    for place in places:
-        value = (value << np.uint64(8)) | frames[:, place]
+def stored_value(buffer: np.ndarray, places: np.ndarray, size: int, order: ByteOrder) -> np.ndarray:
+    """Unsigned integer of `size` bytes that begins at each place of the buffer, uint64 [n]."""
+    value = np.zeros(len(places), dtype=np.uint64)
+    for offset in range(size) if order == "big" else range(size - 1, -1, -1):
+        value = (value << np.uint64(8)) | buffer[places + offset]
     return value
 
 

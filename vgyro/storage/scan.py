@@ -104,13 +104,16 @@ class BinaryScanner:
         length = self._frame.length
         end = self._base + len(self._buffer)
         places = self._sync_places()
-        frames = (
-            np.lib.stride_tricks.sliding_window_view(self._buffer, length)[places] if len(places) else _none(length)
-        )
-        good = self._verify(frames)
-        start = self._base + places[good]
-        self._failed = np.union1d(self._failed, self._base + places[~good])
-        frames = np.ascontiguousarray(frames[good])
+        good = self._verify(self._buffer, places)
+        # What is still in the buffer is judged again, so only older failures are kept.
+        known = self._failed[: np.searchsorted(self._failed, self._base)]
+        self._failed = np.concatenate([known, self._base + places[~good]])
+        places = places[good]
+        start = self._base + places
+        if len(places):
+            frames = np.lib.stride_tricks.sliding_window_view(self._buffer, length)[places]
+        else:
+            frames = np.empty((0, length), dtype=np.uint8)
         settled, keep_from = self._settled(start, end, last)
         found = self._emit(start, frames, settled, last or settled == len(start))
         if last:
@@ -176,7 +179,8 @@ class BinaryScanner:
         if len(index):
             final_counter = 0 if counter is None else int(counter[index[-1]])
             self._previous = (int(start[index[-1]]), final_counter)
-        self._failed = np.union1d(self._failed, start[index[stray]])
+        if stray.any():
+            self._failed = np.union1d(self._failed, start[index[stray]])
         return self._found(start[index[~stray]], frames[index[~stray]])
 
     def _strays(self, start: np.ndarray, counter: np.ndarray) -> np.ndarray:
@@ -216,7 +220,3 @@ class BinaryScanner:
         failed = self._failed[np.searchsorted(self._failed, self._done) :]
         gone = int(np.searchsorted(failed, keep_from))
         self._failed = failed[max(0, gone - 1) :]
-
-
-def _none(length: int) -> np.ndarray:
-    return np.empty((0, length), dtype=np.uint8)

@@ -18,6 +18,7 @@ from vgyro.storage.textscan import TextScanner
 
 PROBE_BYTES = 1 << 20
 MAX_PAIRS = 4096
+LINE_END = 2
 
 
 class Probe(NamedTuple):
@@ -63,7 +64,9 @@ def probe(sources: Sources, board: Board) -> Probe:
     found = scanner.feed(head[:PROBE_BYTES], last=True)
     count = len(found.start)
     share = float((found.stop - found.start).sum()) / len(head) if len(head) else 0.0
-    length = float(np.median(np.diff(found.start))) if count > 1 else scanner.typical_length
+    length = scanner.typical_length
+    if count and not isinstance(board.layout, BinaryFrame):
+        length = float(np.median(found.stop - found.start)) + LINE_END
     return Probe(count, min(1.0, share), _period(found, board), length, _counter_step(found))
 
 
