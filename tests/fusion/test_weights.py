@@ -131,8 +131,7 @@ def test_wrong_shape_and_unknown_engine():
 def test_blocks_reach_their_samples():
     # 4 Hz samples; blocks of 1 s; a gap after 2.5 s; the second stretch begins at 10.1 s.
     time = np.concatenate([np.arange(10) / 4, 10.1 + np.arange(6) / 4])
-    segment = np.repeat([0, 1], [10, 6])
-    block = block_of_sample(time, segment, np.array([0.0, 1.0, 10.1]), np.array([0, 0, 1]), 1.0, 4.0)
+    block = block_of_sample(time, np.array([0.0, 1.0, 10.1]), 1.0, 4.0)
     assert block.tolist() == [0, 0, 0, 0, 1, 1, 1, 1, -1, -1, 2, 2, 2, 2, -1, -1]
     weights = np.array([[1.0, 0.0], [0.3, 0.7], [0.0, 1.0]])
     expanded = SampleWeights({("dcc", "causal", "level"): (weights, block)})["dcc", "causal", "level"]
@@ -145,9 +144,9 @@ def test_blocks_reach_their_samples():
 def test_block_borders_survive_rounded_time_stamps():
     # One hour at 200 Hz, time stamps that accumulate rounding: every block must have its 200 samples.
     time = np.cumsum(np.full(200 * 3600, 0.005)) - 0.005
-    block = block_of_sample(time, np.zeros(len(time)), np.arange(3600.0), np.zeros(3600), 1.0, 200.0)
+    block = block_of_sample(time, np.arange(3600.0), 1.0, 200.0)
     assert (np.bincount(block) == 200).all()
 
 
 def test_no_blocks_at_all():
-    assert block_of_sample(np.arange(3.0), np.zeros(3), np.empty(0), np.empty(0), 1.0, 1.0).tolist() == [-1, -1, -1]
+    assert block_of_sample(np.arange(3.0), np.empty(0), 1.0, 1.0).tolist() == [-1, -1, -1]

@@ -35,6 +35,17 @@ def test_no_block_crosses_a_gap_or_leaves_rest():
     np.testing.assert_array_equal(series.time, [0, 2, 100, 103, 105])
 
 
+def test_a_few_lost_samples_do_not_break_the_series():
+    # Blocks of four slots; slot 5 is lost, then slots 12 to 14, then the board restarts with no time between.
+    slots = np.array([0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11, 15, 16, 17, 18, 19, 20, 21, 22, 23])
+    segment = np.array([0] * 5 + [1] * 6 + [2] * 5 + [3] * 4)
+    series = block_means(slots[:, None].astype(float), 1.0, 0.25, segment, time=slots.astype(float))
+    np.testing.assert_array_equal(series.values[:, 0], [1.5, 17 / 3, 9.5, 16.5, 20.5 + 1])
+    np.testing.assert_array_equal(series.stretch, [0, 0, 0, 1, 2])
+    np.testing.assert_array_equal(series.block_index, [0] * 4 + [1] * 3 + [2] * 4 + [3] * 4 + [-1] + [4] * 4)
+    np.testing.assert_array_equal(series.time, [0, 4, 8, 15, 20])
+
+
 def test_full_rate_and_rates_that_do_not_divide():
     rate = np.random.default_rng(0).standard_normal((1000, 2))
     np.testing.assert_array_equal(block_means(rate, 50.0, "full").values, rate)

@@ -64,17 +64,15 @@ def _refuse_unusable(matrices: np.ndarray, leading: tuple[int, ...]) -> None:
 
 def block_of_sample(
     time: np.ndarray,
-    segment: np.ndarray,
     block_time: np.ndarray,
-    block_segment: np.ndarray,
     block_s: float,
     rate_hz: float,
 ) -> np.ndarray:
     """Number of the block that each sample lies in, -1 for none: array [T] of int.
 
-    time, segment             : [T] of the samples
-    block_time, block_segment : [M], time of each block's first sample, increasing, and its stretch
-    block_s                   : length of a block, s
+    time       : [T] of the samples, s
+    block_time : [M], time of each block's first sample, increasing, s
+    block_s    : length of a block, s
     """
     if len(block_time) == 0:
         return np.full(len(time), -1)
@@ -83,7 +81,7 @@ def block_of_sample(
     index = np.searchsorted(block_time, late, side="right") - 1
     inside = index >= 0
     index = np.maximum(index, 0)
-    inside &= (late - block_time[index] < block_s) & (segment == block_segment[index])
+    inside &= late - block_time[index] < block_s
     return np.where(inside, index, -1)
 
 

@@ -81,7 +81,5 @@ def read_weights(
                 reasons[key] = str(rows["status"][chosen][0])
                 continue
             weights = np.column_stack([rows[f"w_{gyro}"][chosen] for gyro in gyros])
-            time, segment = rows["time"][chosen], rows["segment"][chosen]
-            block = block_of_sample(file.time, file.segment, time, segment, block_s, file.rate_hz)
-            blocks[key] = (weights, block)
+            blocks[key] = (weights, block_of_sample(file.time, rows["time"][chosen], block_s, file.rate_hz))
     return SampleWeights(blocks), reasons

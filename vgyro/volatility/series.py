@@ -16,7 +16,7 @@ class Series:
     """The series that is analysed: means of blocks of samples.
 
     values [M, N] deg/s; time [M] s, of the block's first sample; segment [M], of the rates;
-    stretch [M]: number of the run without a gap in time or in rest, within which windows lie;
+    stretch [M]: number of the run without a missing block, within which windows lie;
     block_index [T]: the block that each sample of the rates is in, -1: in none (motion, or too few left for a block);
     rate_hz : blocks a second
     """
@@ -37,7 +37,10 @@ def block_means(
     rest: np.ndarray | None = None,
     time: np.ndarray | None = None,
 ) -> Series:
-    """Means over blocks of rate_hz/block_hz samples (rounded), never across a gap or from rest into motion.
+    """Means over blocks of rate_hz/block_hz samples (rounded), never from rest into motion.
+
+    A few lost samples do not break the series: a block in which at least half of the samples are there is the mean of
+    those. A longer gap ends a stretch, and so does a restart of the board.
 
     rate     : [T, N] deg/s at rate_hz
     block_hz : rate of the series, or "full": every sample is a block
@@ -59,21 +62,50 @@ def block_means(
     segment = np.zeros(samples, dtype=np.int32) if segment is None else np.asarray(segment)
     use = np.ones(samples, dtype=bool) if rest is None else np.asarray(rest, dtype=bool)
     time = np.arange(samples) / rate_hz if time is None else np.asarray(time, dtype=float)
+    step = _slots_to_next(time, segment, use, rate_hz, length)
     block_index = np.full(samples, -1, dtype=np.int64)
-    starts, numbers = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int32)]
-    blocks = 0
-    for number, run in enumerate(run for run in stretches(segment, use) if use[run.start]):
-        count = run.length // length
-        first = run.start + length * np.arange(count)
-        block_index[run.start : run.start + count * length] = blocks + np.repeat(np.arange(count), length)
-        starts.append(first)
-        numbers.append(np.full(count, number, dtype=np.int32))
-        blocks += count
+    starts, numbers, values = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int32)], [np.empty((0, n))]
+    blocks, number = 0, 0
+    for run in stretches(np.cumsum(step == 0), use):
+        if not use[run.start]:
+            continue
+        block = np.concatenate([[0], np.cumsum(step[run.start + 1 : run.stop])]) // length
+        count = np.bincount(block)
+        # A block is complete when the run reaches its last slot, and good when at least half of its samples are there.
+        last_slot = int(step[run.start + 1 : run.stop].sum()) + 1
+        good = (2 * count >= length) & (length * (np.arange(len(count)) + 1) <= last_slot)
+        sums = np.column_stack([np.bincount(block, weights=rate[run.start : run.stop, i]) for i in range(n)])
+        values.append(sums[good] / count[good, None])
+        block_number = np.where(good, blocks + np.cumsum(good) - 1, -1)
+        block_index[run.start : run.stop] = block_number[block]
+        starts.append(run.start + np.searchsorted(block, np.flatnonzero(good)))
+        # A block that is not good ends a stretch.
+        numbers.append((number + np.cumsum(~good)[good]).astype(np.int32))
+        blocks += int(good.sum())
+        number += int((~good).sum()) + 1
     start = np.concatenate(starts)
-    values = np.zeros((len(start), n))
-    for offset in range(length):
-        values += rate[start + offset]
-    return Series(values / length, time[start], segment[start], np.concatenate(numbers), block_index, rate_hz / length)
+    stretch = np.unique(np.concatenate(numbers), return_inverse=True)[1].astype(np.int32)
+    return Series(np.concatenate(values), time[start], segment[start], stretch, block_index, rate_hz / length)
+
+
+def _slots_to_next(time: np.ndarray, segment: np.ndarray, use: np.ndarray, rate_hz: float, length: int) -> np.ndarray:
+    """Sample periods from the sample before to each sample, [T]; 0 where a new run begins.
+
+    1 inside a segment. A gap of known duration, no longer than half a block, counts its lost samples; any other gap, and
+    a change between rest and motion, begins a new run.
+    """
+    step = np.ones(len(time), dtype=np.int64)
+    if len(time) == 0:
+        return step
+    border = np.concatenate([[False], segment[1:] != segment[:-1]])
+    periods = np.rint(np.diff(time, prepend=time[0]) * rate_hz).astype(np.int64)
+    # Without lost samples in between, the time that passed is not known: the board was restarted.
+    bridged = border & (periods >= 2) & (periods - 1 <= length // 2)
+    step[bridged] = periods[bridged]
+    step[border & ~bridged] = 0
+    step[1:][use[1:] != use[:-1]] = 0
+    step[0] = 0
+    return step
 
 
 def residuals(
