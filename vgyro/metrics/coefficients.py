@@ -15,6 +15,7 @@ FLICKER = 2 * math.log(2) / math.pi
 PASSES = 12
 FEWEST_POINTS = 6
 STEPS_OF_BISECTION = 10
+LARGEST_MISFIT = 5.0
 LOWEST_SHARE = 1e-6  # of the variance found: a model may not fall below it
 
 
@@ -31,7 +32,8 @@ class Coefficient:
 class NoiseCoefficients:
     """N deg/s/√Hz (two-sided), B deg/s, K deg/s/√s; the fit used τ >= tau_from, s.
 
-    misfit : Σ (σ² - model)²·edf/(2 model²) a point; far above 1: the model does not describe the curve
+    misfit : Σ (σ² - model)²·edf/(2 model²) a point; far above 1: the model does not describe the curve, because of
+             tones or other noise that is no power law; `reliable` is then False
     """
 
     N: Coefficient
@@ -40,6 +42,11 @@ class NoiseCoefficients:
     tau_from: float
     misfit: float
     note: str = ""
+
+    @property
+    def reliable(self) -> bool:
+        """Does the model describe the curve?"""
+        return self.misfit <= LARGEST_MISFIT
 
 
 def noise_coefficients(
@@ -92,14 +99,17 @@ def noise_coefficients(
     model = np.maximum(columns @ fitted, LOWEST_SHARE * variance)
     misfit = float(np.mean((variance - model) ** 2 * edf / (2 * model**2)))
     N, B, K = found
-    return NoiseCoefficients(N, B, K, float(tau[0]), misfit, _note(fitted, float(tau[0]), first > 0 or constant > 0))
+    note = _note(fitted, float(tau[0]), first > 0 or constant > 0, misfit)
+    return NoiseCoefficients(N, B, K, float(tau[0]), misfit, note)
 
 
-def _note(fitted: np.ndarray, tau: float, late: bool) -> str:
+def _note(fitted: np.ndarray, tau: float, late: bool, misfit: float) -> str:
     notes = [f"fitted from τ = {tau:.3g} s"] if late else []
     if len(fitted) > len(TERMS):
-        kind = "the gyro's own low-pass" if fitted[-1] < 0 else "noise of the angle (quantisation)"
+        kind = "the gyro's own low-pass" if fitted[-1] < 0 else "noise of the angle (quantisation, a tone)"
         notes.append(f"with a term 1/τ² for {kind}")
+    if misfit > LARGEST_MISFIT:
+        notes.append(f"N + B + K does not describe this curve (misfit {misfit:.3g}): read the curve itself")
     return ", ".join(notes)
 
 

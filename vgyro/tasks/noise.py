@@ -18,6 +18,7 @@ from vgyro.metrics import (
     correlation_matrix,
     noise_coefficients,
     noise_from_differences,
+    read_curve,
     without_means,
 )
 from vgyro.storage.tables import write_json
@@ -25,15 +26,20 @@ from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.rates_file import ArrayFile, read_array
 
 ENOUGH_REST_S = 10.0
+LONG_ENOUGH = 30  # samples
 
 
 @dataclass(frozen=True)
 class ArrayNoiseRecord:
-    """What is written: N deg/s/√Hz (two-sided) and K deg/s/√s with limits, correlation [N, N], and how it was found."""
+    """What is written: N deg/s/√Hz (two-sided) and K deg/s/√s with limits, correlation [N, N], and how it was found.
+
+    read : σ(1 s) of each gyro, deg/s/√Hz, which stands in for N where the fit does not hold
+    """
 
     method: str
     seconds: float
     coefficients: list[NoiseCoefficients]
+    read: list[float]
     correlation: np.ndarray
 
 
@@ -44,16 +50,21 @@ def main(task: Task) -> None:
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     path = task.inputs["rates"][0]
     array = read_array(path, gyros, task.options["axis"])
-    at_rest = array.at_rest.sum() / array.rate_hz >= ENOUGH_REST_S
-    found = noise_at_rest(array, options, engine) if at_rest else noise_in_motion(array, engine)
+    found = noise_at_rest(array, options, engine) if rests_enough(array) else noise_in_motion(array, engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
+
+
+def rests_enough(array: ArrayFile) -> bool:
+    """Is there rest enough to see the noise in, one stretch of it long enough for an Allan curve?"""
+    lengths = np.unique(array.rest_segment(), return_counts=True)[1]
+    return bool(lengths.sum() >= ENOUGH_REST_S * array.rate_hz and lengths.max() >= LONG_ENOUGH)
 
 
 def noise_at_rest(array: ArrayFile, options: MetricsOptions, engine: str) -> ArrayNoiseRecord:
     """From the samples at rest; each stretch's own mean removed."""
     segment = array.rest_segment()
     rate = without_means(array.rate[array.at_rest], segment)
-    fits = []
+    fits, read = [], []
     for column in range(rate.shape[1]):
         curve = allan_deviation(
             rate[:, column],
@@ -65,8 +76,9 @@ def noise_at_rest(array: ArrayFile, options: MetricsOptions, engine: str) -> Arr
             per_octave=options.taus_per_octave,
         )
         fits.append(noise_coefficients(curve, replicates=options.bootstrap, seed=options.seed))
+        read.append(read_curve(curve, 1.0)[0])
     correlation = correlation_matrix(rate, array.rate_hz, segment, options.confidence).value
-    return ArrayNoiseRecord("samples at rest", len(rate) / array.rate_hz, fits, correlation)
+    return ArrayNoiseRecord("samples at rest", len(rate) / array.rate_hz, fits, read, correlation)
 
 
 def noise_in_motion(array: ArrayFile, engine: str) -> ArrayNoiseRecord:
@@ -84,13 +96,14 @@ def noise_in_motion(array: ArrayFile, engine: str) -> ArrayNoiseRecord:
         for a, b in zip(n.tolist(), k.tolist(), strict=True)
     ]
     method = "differences between the gyros, no rest long enough; their correlation is taken as none"
-    return ArrayNoiseRecord(method, len(array.rate) / array.rate_hz, fits, np.eye(number))
+    return ArrayNoiseRecord(method, len(array.rate) / array.rate_hz, fits, [math.nan] * number, np.eye(number))
 
 
 def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: str) -> dict[str, Any]:
-    """JSON: arw and rrw by gyro; where K was not found its upper limit stands in, and rrw_source says so."""
+    """JSON: arw and rrw by gyro, such that filters can use them; arw_source and rrw_source say what they are."""
     correlation = np.where(np.isnan(found.correlation), np.eye(len(gyros)), found.correlation)
     fits = dict(zip(gyros, found.coefficients, strict=True))
+    arw = {gyro: _usable_arw(fit, read) for (gyro, fit), read in zip(fits.items(), found.read, strict=True)}
     rrw = {gyro: _usable_rrw(fit) for gyro, fit in fits.items()}
     return {
         "axis": axis,
@@ -99,10 +112,11 @@ def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: s
         "seconds": found.seconds,
         "gyros": gyros,
         "units": {"arw": "deg/s/√Hz, two-sided", "rrw": "deg/s/√s", "bias_instability": "deg/s"},
-        "arw": {gyro: _number(fit.N.value) for gyro, fit in fits.items()},
+        "arw": {gyro: _number(value) for gyro, (value, _) in arw.items()},
+        "arw_source": {gyro: source for gyro, (_, source) in arw.items()},
         "arw_low": {gyro: _number(fit.N.low) for gyro, fit in fits.items()},
         "arw_high": {gyro: _number(fit.N.high) for gyro, fit in fits.items()},
-        "arw_deg_rt_h": {gyro: _number(units.arw_deg_rt_h(fit.N.value)) for gyro, fit in fits.items()},
+        "arw_deg_rt_h": {gyro: _number(units.arw_deg_rt_h(value)) for gyro, (value, _) in arw.items()},
         "rrw": {gyro: _number(value) for gyro, (value, _) in rrw.items()},
         "rrw_source": {gyro: source for gyro, (_, source) in rrw.items()},
         "rrw_low": {gyro: _number(fit.K.low) for gyro, fit in fits.items()},
@@ -110,6 +124,13 @@ def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: s
         "bias_instability": {gyro: _number(fit.B.value) for gyro, fit in fits.items()},
         "correlation": [[float(value) for value in row] for row in correlation],
     }
+
+
+def _usable_arw(fit: NoiseCoefficients, read: float) -> tuple[float, str]:
+    fitted = fit.N.value
+    if math.isfinite(read) and read > 0 and (fit.N.low == 0 or not fit.reliable):
+        return read, "σ(1 s): the fitted curve does not hold"
+    return fitted, "fitted" if math.isfinite(fitted) else "not known"
 
 
 def _usable_rrw(fit: NoiseCoefficients) -> tuple[float, str]:
