@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vgyro.board import Board
+from vgyro.board import BinaryFrame, Board
 from vgyro.config import IntegrityOptions
 from vgyro.storage.clock import LOST, PAUSE, Clock, Timed
 from vgyro.storage.frames import Frames, channel_watches
@@ -121,7 +121,9 @@ class DumpReader:
 
     def _cause(self, start: int, stop: int, damage: int) -> str:
         begins = start in (0, *self._sources.borders())
-        if begins and (damage == NO_SYNC or stop - start < self._length):
+        # A line of text has no fixed length: one that lost its beginning may be longer than the usual one.
+        shortest = self._length if isinstance(self.board.layout, BinaryFrame) else 2 * self._length
+        if begins and (damage == NO_SYNC or stop - start < shortest):
             return LEADING
         return CAUSES[damage]
 
