@@ -188,6 +188,16 @@ def test_a_log_of_rates_is_not_calibrated(tmp_path: Path, board: Board):
         assert np.all(rates[gyro.name] == gyro.sign * 1.25)
 
 
+def test_time_stamps_may_contradict_the_declared_rate(tmp_path: Path, board: Board):
+    record = manifest({"name": "static", "kind": "static", "files": "x.bin"})
+    run_calibrate(tmp_path, board, record, [])
+    for factor, expected in ((1.0, RATE_HZ), (1.01, RATE_HZ), (2.0, RATE_HZ / 2)):
+        columns = counts_of(board, np.zeros(1000))
+        columns["time"] = columns["time"] * factor + np.where(np.arange(1000) < 500, 0, 60)
+        run_convert(tmp_path, board, record, "static", write_frames(tmp_path / "frames", columns))
+        assert read_metadata(tmp_path / "static.parquet")["rate_hz"] == pytest.approx(expected, rel=1e-9)
+
+
 def test_empty_frames(tmp_path: Path, board: Board):
     record = manifest({"name": "static", "kind": "static", "files": "x.bin"})
     run_calibrate(tmp_path, board, record, [])

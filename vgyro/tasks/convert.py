@@ -12,12 +12,15 @@ from vgyro.board import Board
 from vgyro.calibration import clipped_samples, find_rest, fit_phase, sinusoid, to_rates
 from vgyro.config import RestOptions
 from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, Recording, SinusoidReference
-from vgyro.storage.tables import TableWriter, read_columns, read_json, read_metadata
+from vgyro.storage.tables import TableWriter, read_columns, read_json
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.reference_log import read_reference
 
 BATCH = 1 << 18
 MOSTLY_CLIPPED = 0.01
+CONTRADICTION = 0.02
+FEWEST_STEPS = 10
+GAP_STEPS = 1.5
 
 
 def main(task: Task) -> None:
@@ -31,7 +34,7 @@ def main(task: Task) -> None:
     frames = task.input("frames")
     converter = Converter(board, recording, read_json(task.input("calibration"))["gyros"])
     time = read_columns(frames, ["time"])["time"]
-    rate_hz = sample_rate(frames, recording, board, time)
+    rate_hz = sample_rate(recording, board, time)
     options = RestOptions.model_validate(task.options["analysis"].get("rest", {}))
     clipped = converter.clipped(frames)
     at_rest = rest_of(converter, frames, time, rate_hz, options)
@@ -111,12 +114,17 @@ class Converter:
         return np.column_stack([rate.astype(np.float32) for rate in chosen.rates_of(raw).values()])
 
 
-def sample_rate(frames: Path, recording: Recording, board: Board, time: np.ndarray) -> float:
-    """Sample rate, Hz: what decode wrote, else that of the manifest, else of the board."""
-    written = read_metadata(frames).get("rate_hz")
-    if written is None and time.size == 0:
-        return float(recording.rate_hz or board.rate_hz)
-    return float(written or recording.rate_hz or board.rate_hz)
+def sample_rate(recording: Recording, board: Board, time: np.ndarray) -> float:
+    """Sample rate, Hz: as declared, unless the time stamps contradict it by more than 2 %."""
+    declared = float(recording.rate_hz or board.rate_hz)
+    if time.size < FEWEST_STEPS:
+        return declared
+    steps = np.diff(time)
+    usual = steps[steps <= GAP_STEPS * np.median(steps)]
+    if usual.size == 0 or usual.mean() <= 0:
+        return declared
+    measured = 1.0 / float(usual.mean())
+    return measured if abs(measured / declared - 1) > CONTRADICTION else declared
 
 
 def rest_of(converter: Converter, frames: Path, time: np.ndarray, rate_hz: float, options: RestOptions) -> np.ndarray:
