@@ -176,8 +176,8 @@ def test_higher_orders(simulator):
 
 @pytest.mark.full
 def test_a_dense_grid_of_starts_seldom_finds_a_better_optimum(simulator):
-    # Expected: the best of 12 starts of arch. Several optima are normal at T = 360, and arch's first step may jump from one
-    # to another: a few misses remain, all of them far smaller than what tells two models apart (1.92 at 5 %).
+    # Expected: the best of 12 starts of arch. Several optima are normal at T = 360, and arch's first step may jump from
+    # one to another: a few misses remain, all of them far smaller than what tells two models apart (1.92 at 5 %).
     r = simulator(360, [1e-4] * 60, [0.05] * 60, [0.9] * 60, seed=21)[0]
     fit = fit_garch(r)
     missed = np.zeros(60)
