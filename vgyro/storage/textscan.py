@@ -97,8 +97,10 @@ class TextScanner:
         if self._frame.checksum.family != "none":
             return texts, start, stop
         if self._held is not None:
-            texts = [self._held[0], *texts]
-            start, stop = np.insert(start, 0, self._held[1]), np.insert(stop, 0, self._held[2])
+            # It is still in the buffer, and is found again.
+            after = start >= self._held[2]
+            texts = [self._held[0], *(text for text, later in zip(texts, after, strict=True) if later)]
+            start, stop = np.insert(start[after], 0, self._held[1]), np.insert(stop[after], 0, self._held[2])
             self._held = None
         elif not len(start) or start[0] > 0:
             return texts, start, stop
