@@ -26,11 +26,15 @@ def changed_by_edit(package: Path, file: str, tasks: list[str]) -> set[str]:
     return {task for task in tasks if closure.code_hash(f"vgyro.tasks.{task}") != before[task]}
 
 
-TASKS = ["decode", "calibrate", "convert", "garch", "dcc", "weights", "fuse", "noise", "measure", "report"]
+TASKS = ["decode", "calibrate", "convert", "volatility", "fuse", "noise", "measure", "report"]
 
 
 def test_editing_metrics_changes_the_stages_that_measure(package: Path) -> None:
-    assert changed_by_edit(package, "metrics/allan.py", TASKS) == {"noise", "measure"}
+    assert changed_by_edit(package, "metrics/allan.py", TASKS) == {"noise", "measure", "report"}
+
+
+def test_editing_a_filter_does_not_fit_the_windows_again(package: Path) -> None:
+    assert changed_by_edit(package, "fusion/filters.py", TASKS) == {"fuse"}
 
 
 def test_editing_the_report_changes_the_report_alone(package: Path) -> None:
@@ -42,8 +46,8 @@ def test_editing_a_template_changes_the_report_alone(package: Path) -> None:
 
 
 def test_editing_the_decoder_changes_decoding_alone(package: Path) -> None:
-    changed = changed_by_edit(package, "storage/dump.py", TASKS)
-    assert changed == {"decode"}
+    changed = changed_by_edit(package, "storage/scan.py", TASKS)
+    assert changed == {"decode"}, "the stages after it read tables only"
 
 
 def test_editing_units_changes_everything_that_converts(package: Path) -> None:
@@ -52,4 +56,4 @@ def test_editing_units_changes_everything_that_converts(package: Path) -> None:
 
 def test_imports_inside_functions_count() -> None:
     # vgyro.engine loads the reference engine when it is asked for, not before.
-    assert "vgyro.engine.reference.garch" in closure.import_closure("vgyro.tasks.garch")
+    assert "vgyro.engine.reference.garch" in closure.import_closure("vgyro.tasks.volatility")

@@ -35,7 +35,7 @@ def test_second_run_one_core_and_edits(lab) -> None:
     source.write_text(source.read_text(encoding="utf-8") + "\n# edited\n", encoding="utf-8")
     planned = jobs_planned(lab.run("--cores", "2", "--dry-run").stdout)
     assert {"measure", "report"} <= planned
-    assert not planned & {"decode", "calibrate", "convert", "garch", "dcc", "weights"}
+    assert not planned & {"decode", "calibrate", "convert", "volatility"}
     source.write_text(source.read_text(encoding="utf-8").removesuffix("\n# edited\n"), encoding="utf-8")
 
     shutil.rmtree(lab.folder / "results")

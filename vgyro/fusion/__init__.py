@@ -1,8 +1,13 @@
 """Fusion of an array into one rate: weights, filters, and the registry of methods."""
 
-from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, Method
-from vgyro.fusion.registry import METHODS, Outcome, run_methods, select
-from vgyro.fusion.weights import SampleWeights, block_of_sample, expand_weights, min_variance_weights, usable
+from typing import TYPE_CHECKING
+
+from vgyro.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, Method
+    from vgyro.fusion.registry import METHODS, Outcome, run_methods, select
+    from vgyro.fusion.weights import SampleWeights, block_of_sample, expand_weights, min_variance_weights, usable
 
 __all__ = [
     "METHODS",
@@ -21,3 +26,12 @@ __all__ = [
     "select",
     "usable",
 ]
+
+_ARRAY = ("ArrayNoise", "ArrayRates", "CannotRun", "FilterParameters", "Fused", "Method")
+_REGISTRY = ("METHODS", "Outcome", "run_methods", "select")
+_WEIGHTS = ("SampleWeights", "block_of_sample", "expand_weights", "min_variance_weights", "usable")
+
+__getattr__ = lazy_exports(
+    __name__,
+    {**dict.fromkeys(_ARRAY, "array"), **dict.fromkeys(_REGISTRY, "registry"), **dict.fromkeys(_WEIGHTS, "weights")},
+)

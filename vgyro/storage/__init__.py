@@ -1,23 +1,21 @@
-"""Files: dumps and logs of recordings in, artefacts in and out.
+"""Files: dumps and logs of recordings in, artefacts in and out."""
 
-The public functions are looked up when they are asked for: whoever only reads and writes tables does not depend on the
-code that decodes, and need not run again when it changes.
-"""
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import Any
+from vgyro.lazy import lazy_exports
 
-_HOME = {
-    "Frames": "vgyro.storage.frames",
-    "Reader": "vgyro.storage.frames",
-    "Integrity": "vgyro.storage.integrity",
-    "Refused": "vgyro.storage.integrity",
-    "decode_dump": "vgyro.storage.decode",
-    "open_recording": "vgyro.storage.decode",
-}
+if TYPE_CHECKING:
+    from vgyro.storage.decode import decode_dump, open_recording
+    from vgyro.storage.frames import Frames, Reader
+    from vgyro.storage.integrity import Integrity, Refused
 
+__all__ = ["Frames", "Integrity", "Reader", "Refused", "decode_dump", "open_recording"]
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        **dict.fromkeys(("Frames", "Reader"), "frames"),
+        **dict.fromkeys(("Integrity", "Refused"), "integrity"),
+        **dict.fromkeys(("decode_dump", "open_recording"), "decode"),
+    },
+)

@@ -6,7 +6,7 @@ import numpy as np
 
 from vgyro.errors import TooShort
 from vgyro.storage.tables import write_table
-from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.common import Task
 from vgyro.tasks.volatility_series import WHOLE, ArraySeries, enough, open_series, stored_garch
 from vgyro.volatility.arch_lm import arch_lm, kurtosis
 from vgyro.volatility.garch import garch_variance
@@ -69,7 +69,3 @@ def rows_of(array: ArraySeries, name: str, series: np.ndarray) -> list[dict[str,
         }
         for i, gyro in enumerate(array.gyros)
     ]
-
-
-if __name__ == "__main__":
-    run_task(main)

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 
 from vgyro.storage.tables import write_table
-from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.common import Task
 from vgyro.tasks.volatility_series import ArraySeries, enough, open_series, stored_garch, with_progress
 from vgyro.volatility.stretches import Window
 from vgyro.volatility.windowed import fit_array_dcc
@@ -43,7 +43,3 @@ def row_of(array: ArraySeries, number: int, window: Window, garch: dict[str, np.
         "p_value_s": test.p_value_s,
         "status": fit.status,
     }
-
-
-if __name__ == "__main__":
-    run_task(main)

@@ -6,7 +6,7 @@ import numpy as np
 
 from vgyro.engine.models import TOO_SHORT
 from vgyro.storage.tables import write_table
-from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.common import Task
 from vgyro.tasks.volatility_series import ArraySeries, enough, open_series, with_progress
 from vgyro.volatility.garch import fit_garch
 from vgyro.volatility.stretches import Window
@@ -45,7 +45,3 @@ def _rows(place: dict[str, object], gyros: list[str], *figures: np.ndarray) -> l
         }
         for i, gyro in enumerate(gyros)
     ]
-
-
-if __name__ == "__main__":
-    run_task(main)

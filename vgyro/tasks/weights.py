@@ -9,10 +9,10 @@ import numpy as np
 
 from vgyro.config import CorrelationModel, Mode
 from vgyro.engine.models import FAILED, NOT_POSITIVE_DEFINITE
-from vgyro.fusion import min_variance_weights
+from vgyro.fusion.weights import min_variance_weights
 from vgyro.fusion.weights import usable
 from vgyro.storage.tables import TableWriter, read_columns
-from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.common import Task
 from vgyro.tasks.volatility_series import WHOLE, ArraySeries, open_series, stored_garch
 from vgyro.volatility.rolling import ModelWindow, RollingWeights, rolling_weights
 
@@ -98,7 +98,3 @@ def columns_of(array: ArraySeries, model: str, mode: str, found: RollingWeights)
         **{f"sd_{gyro}": found.deviation[:, i] for i, gyro in enumerate(array.gyros)},
         "status": found.status,
     }
-
-
-if __name__ == "__main__":
-    run_task(main)
