@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -246,7 +247,7 @@ def _unit(columns: np.ndarray, variance: np.ndarray, term: int) -> float:
     return float(0.01 * np.min(variance / columns[:, term]))
 
 
-def _crossing(share_below, start: float, level: float, up: bool) -> float:  # type: ignore[no-untyped-def]
+def _crossing(share_below: Callable[[float], float], start: float, level: float, up: bool) -> float:
     """The value at which the share of draws below the value found falls through `level`."""
     step, near, far = 0.01, start, start
     for _ in range(30):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -118,7 +119,7 @@ def _density_note(value: float, band: tuple[float, float]) -> str:
     return f"two-sided, {band[0]:.3g}-{band[1]:.3g} Hz; one-sided {units.one_sided(value):.4g}"
 
 
-def _fitted(coefficient: Coefficient, convert, note: str) -> Reading:  # type: ignore[no-untyped-def]
+def _fitted(coefficient: Coefficient, convert: Callable[[float], float], note: str) -> Reading:
     value, low, high = (float(convert(number)) for number in (coefficient.value, coefficient.low, coefficient.high))
     if low == 0 and math.isfinite(high) and high > 0:
         note = f"not shown to exist: < {high:.4g}" + (f"; {note}" if note else "")
