@@ -66,7 +66,8 @@ def test_no_traceback_on_the_terminal(output: str) -> None:
     assert "Traceback" not in output
 
 
-def test_a_wrong_config_stops_everything(lab, output: str) -> None:
+@pytest.mark.usefixtures("output")
+def test_a_wrong_config_stops_everything(lab) -> None:
     path = lab.folder / "config/config.yaml"
     kept = path.read_text(encoding="utf-8")
     path.write_text("analysis: {volatility: {widow: 3}}\n", encoding="utf-8")

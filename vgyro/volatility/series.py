@@ -91,8 +91,8 @@ def block_means(
 def _slots_to_next(time: np.ndarray, segment: np.ndarray, use: np.ndarray, rate_hz: float, length: int) -> np.ndarray:
     """Sample periods from the sample before to each sample, [T]; 0 where a new run begins.
 
-    1 inside a segment. A gap of known duration, no longer than half a block, counts its lost samples; any other gap, and
-    a change between rest and motion, begins a new run.
+    1 inside a segment. A gap of known duration, no longer than half a block, counts its lost samples; any other gap,
+    and a change between rest and motion, begins a new run.
     """
     step = np.ones(len(time), dtype=np.int64)
     if len(time) == 0:
