@@ -22,6 +22,8 @@ FAILS: Outcome = "does not hold"
 OPEN: Outcome = "cannot be decided"
 Selection = dict[str, str | int | bool]
 EACH = "$each"
+# So many reasons are given in full.
+FEW = 2
 
 
 class Bounded(StrictModel):
@@ -160,8 +162,9 @@ def _all(parts: list[Verdict]) -> Verdict:
         if worst:
             more = f" (and {len(worst) - 1} more of {len(parts)} like it)" if len(worst) > 1 else ""
             return Verdict(worst[0].outcome, worst[0].reason + more)
-    reasons = dict.fromkeys(part.reason for part in parts)
-    return Verdict(HOLDS, "; ".join(reasons))
+    reasons = list(dict.fromkeys(part.reason for part in parts))
+    more = f" (and {len(reasons) - FEW} more like it)" if len(reasons) > FEW else ""
+    return Verdict(HOLDS, "; ".join(reasons[:FEW]) + more)
 
 
 def ratio(of: Ours, to: Ours, paired: bool = False) -> Ours:

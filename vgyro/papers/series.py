@@ -80,8 +80,9 @@ def paired_ratios(
     """Mean (as a magnitude), 1σ and ARW at 1 s of every series over those of a few, with limits.
 
     over : label → series to divide by;  the other arguments as in `series_figures`
-    Both series are resampled with the same blocks, so that the noise they share does not widen the limits. Bias drift
-    is not there: the minimum of a curve cannot be resampled by blocks.
+    Both series are resampled with the same blocks, so that the noise they share does not widen the limits. The limits
+    are percentiles moved by a factor to have the ratio itself as their median: blocks are shorter than the drift and
+    lose a part of it. Bias drift is not there: the minimum of a curve cannot be resampled by blocks.
     """
     sums = make_units(values, rate_hz, stretch)
     drawn = resample(sums, options.bootstrap, options.seed)
@@ -96,8 +97,8 @@ def paired_ratios(
         for index, (method, definition) in enumerate(names):
             for metric in PAIRED:
                 drawn_ratio = replicates[metric][:, index] / replicates[metric][:, to]
-                low, high = (float(limit) for limit in np.quantile(drawn_ratio, tails))
                 value = float(figures[metric][index] / figures[metric][to])
+                low, high = (float(limit) for limit in value * np.quantile(drawn_ratio, tails) / np.median(drawn_ratio))
                 about = {"method": method, "definition": definition, "over": label, "metric": metric}
                 rows.append({**place, **about, "value": value, "low": low, "high": high, "unit": "1", "note": ""})
     return rows
