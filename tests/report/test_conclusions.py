@@ -12,6 +12,8 @@ from vgyro.report.model import ArrayPart, DatasetPart
 from vgyro.tasks.common import Task
 from vgyro.tasks.report import read_dataset_part
 
+GYROS = ("g1", "g2", "g3", "g4")
+
 
 @pytest.fixture(scope="module")
 def dataset(report_task: Task) -> DatasetPart:
@@ -30,7 +32,12 @@ def with_metric(dataset: DatasetPart, method: str, metric: str, value: float) ->
     assert mask.any()
     for name in ("value", "low", "high"):
         table[name][mask] = value
-    changed = replace(array, tables={**array.tables, "metrics": table})
+    return with_array(dataset, array, {"metrics": table})
+
+
+def with_array(dataset: DatasetPart, array: ArrayPart, tables: dict) -> DatasetPart:
+    """The data set with some tables of one array changed."""
+    changed = replace(array, tables={**array.tables, **tables})
     recordings = tuple(
         replace(part, arrays=tuple(changed if one is array else one for one in part.arrays))
         for part in dataset.recordings
@@ -38,19 +45,48 @@ def with_metric(dataset: DatasetPart, method: str, metric: str, value: float) ->
     return replace(dataset, recordings=recordings)
 
 
+def with_allan(dataset: DatasetPart, gyro: str, factor: float, from_tau: float = 0.0) -> DatasetPart:
+    """The data set with one gyro's Allan curve of rest-x at a multiple of the median of the others from a τ on."""
+    array = array_of(dataset)
+    table = {name: column.copy() for name, column in array.tables["allan"].items()}
+    others = [table["deviation"][table["series"] == name] for name in GYROS if name != gyro]
+    mask = table["series"] == gyro
+    median = np.median(others, axis=0)
+    scale = np.where(table["tau"][mask] >= from_tau, factor, 1.0)
+    for name, spread in (("deviation", 1.0), ("low", 0.95), ("high", 1.05)):
+        table[name][mask] = median * scale * spread
+    return with_array(dataset, array, {"allan": table})
+
+
+def test_a_gyro_that_is_bad_at_long_times_only_is_found(dataset: DatasetPart) -> None:
+    quiet = with_allan(with_metric(dataset, "g4", "sigma", 0.05), "g4", 1.0)
+    assert bad_gyros(quiet) == []
+    (bad,) = bad_gyros(with_allan(quiet, "g1", 3.5, from_tau=50.0))
+    assert bad.gyro == "g1"
+    assert bad.factor > 3
+
+
+def test_a_tone_above_the_shortest_averaging_time_is_not_held_against_a_gyro(dataset: DatasetPart) -> None:
+    quiet = with_allan(with_metric(dataset, "g4", "sigma", 0.05), "g4", 1.0)
+    array = array_of(quiet)
+    table = {name: column.copy() for name, column in array.tables["allan"].items()}
+    mask = (table["series"] == "g2") & (table["tau"] < 0.1)
+    assert mask.any()
+    for name in ("deviation", "low", "high"):
+        table[name][mask] *= 4
+    assert bad_gyros(with_array(quiet, array, {"allan": table})) == []
+
+
 def test_the_noisy_gyro_is_named_with_its_factor(dataset: DatasetPart) -> None:
     (bad,) = bad_gyros(dataset)
-    # Median of 0.05, 0.052, 0.048, 0.16 is 0.051.
-    assert (bad.gyro, bad.axis) == ("g4", "x")
+    # Median of the 1σ 0.05, 0.052, 0.048, 0.16 is 0.051.
+    assert (bad.gyro, bad.axis, bad.figure) == ("g4", "x", "1σ")
     assert bad.factor == pytest.approx(0.16 / 0.051)
     assert any("g4" in one.text and one.tone == "bad" for one in conclude(dataset))
 
 
 def test_a_gyro_just_inside_the_rule_is_healthy(dataset: DatasetPart) -> None:
-    for metric in ("sigma", "arw", "bias_drift"):
-        values = array_of(dataset).values()
-        median = np.median([values[name, ""][metric].value for name in ("g1", "g2", "g3")])
-        dataset = with_metric(dataset, "g4", metric, 1.9 * median)
+    dataset = with_allan(with_metric(dataset, "g4", "sigma", 1.9 * 0.051), "g4", 1.9)
     assert bad_gyros(dataset) == []
     assert any(one.tone == "good" and "all 4 gyros" in one.text for one in conclude(dataset))
 

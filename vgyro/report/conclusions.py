@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,15 +17,17 @@ from vgyro.report.volatility import LEVEL_OF_TEST
 
 BAD_FACTOR = 2.0
 FEWEST_GYROS = 3
-GYRO_FIGURES = ("sigma", "arw", "bias_drift")
+SHORTEST_TAU = 0.1
+MOST_NAMED = 6
 SIMPLE = ("average", "median", "inverse_variance_arw")
 MOST_LOST = 1e-4
 AT_REST_KINDS = ("static", "thermal", "free")
 REST_FACTORS = (("if_sigma", "1σ"), ("if_bias_drift", "bias drift"))
 STILL_FALLS = "the curve still falls"
 BAD_RULE = (
-    f"A gyro is called bad where its 1σ, its fitted ARW or its bias drift at rest is more than {BAD_FACTOR:g} times "
-    f"the median of its array ({FEWEST_GYROS} gyros or more)."
+    f"A gyro is called bad where its 1σ at rest, or its Allan deviation at an averaging time from {SHORTEST_TAU:g} s "
+    f"up, is more than {BAD_FACTOR:g} times the median of its array ({FEWEST_GYROS} gyros or more); for the Allan "
+    "deviation its 95 % interval must lie above that median too."
 )
 BEST_RULE = (
     "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording "
@@ -47,12 +48,12 @@ class Conclusion:
 
 @dataclass(frozen=True)
 class BadGyro:
-    """factor : its figure over the median of its array"""
+    """A gyro and its worst figure. figure : in words;  factor : over the median of its array"""
 
     gyro: str
     axis: str
     recording: str
-    metric: str
+    figure: str
     factor: float
 
 
@@ -97,23 +98,41 @@ def bad_gyros(dataset: DatasetPart) -> list[BadGyro]:
     """Gyros far above the median of their array, each with its worst figure, the worst gyro first."""
     worst: dict[str, BadGyro] = {}
     for array in at_rest(dataset):
-        values = array.values()
-        for metric in GYRO_FIGURES:
-            for gyro, factor in _over_median(array, values, metric).items():
-                if factor > BAD_FACTOR and (gyro not in worst or factor > worst[gyro].factor):
-                    worst[gyro] = BadGyro(gyro, array.axis, array.recording, metric, factor)
+        for bad in (*_wide(array), *_noisy(array)):
+            if bad.factor > BAD_FACTOR and (bad.gyro not in worst or bad.factor > worst[bad.gyro].factor):
+                worst[bad.gyro] = bad
     return sorted(worst.values(), key=lambda bad: -bad.factor)
 
 
-def _over_median(
-    array: ArrayPart, values: Mapping[tuple[str, str], Mapping[str, Value]], metric: str
-) -> dict[str, float]:
-    figures = {gyro: values[gyro, ""][metric].value for gyro in array.gyros if metric in values.get((gyro, ""), {})}
-    figures = {gyro: value for gyro, value in figures.items() if np.isfinite(value)}
-    if len(figures) < FEWEST_GYROS:
-        return {}
-    median = statistics.median(figures.values())
-    return {gyro: value / median for gyro, value in figures.items()} if median > 0 else {}
+def _wide(array: ArrayPart) -> list[BadGyro]:
+    """1σ of each gyro against the median of the array."""
+    values = array.values()
+    sigma = {gyro: values[gyro, ""]["sigma"].value for gyro in array.gyros if "sigma" in values.get((gyro, ""), {})}
+    sigma = {gyro: value for gyro, value in sigma.items() if np.isfinite(value)}
+    median = statistics.median(sigma.values()) if len(sigma) >= FEWEST_GYROS else 0.0
+    if median <= 0:
+        return []
+    return [BadGyro(gyro, array.axis, array.recording, "1σ", value / median) for gyro, value in sigma.items()]
+
+
+def _noisy(array: ArrayPart) -> list[BadGyro]:
+    """Allan deviation of each gyro against the median of the array, at the τ where it is worst."""
+    table = array.tables.get("allan", {})
+    curves: dict[float, list[tuple[str, float, float]]] = {}
+    for row in rows_of(table):
+        if row["series"] in array.gyros and row["tau"] >= SHORTEST_TAU and np.isfinite(row["deviation"]):
+            point = (str(row["series"]), float(row["deviation"]), float(row["low"]))
+            curves.setdefault(float(row["tau"]), []).append(point)
+    found = []
+    for tau, points in curves.items():
+        median = statistics.median(deviation for _, deviation, _ in points) if len(points) >= FEWEST_GYROS else 0.0
+        words = f"Allan deviation at τ = {significant(tau, 2)} s"
+        found += [
+            BadGyro(gyro, array.axis, array.recording, words, deviation / median)
+            for gyro, deviation, low in points
+            if median > 0 and low > median
+        ]
+    return found
 
 
 def best_method(array: ArrayPart, metric: str, *, full_bandwidth: bool = False) -> Best | None:
@@ -141,18 +160,15 @@ def _gyro_sentences(dataset: DatasetPart) -> list[Conclusion]:
         members = [gyro.name for gyro in dataset.board.array(axis)]
         mine = [one for one in bad if one.axis == axis]
         if mine:
-            listed = "; ".join(_bad_words(dataset, one) for one in mine)
-            verb = "is bad" if len(mine) == 1 else "are bad"
-            text = f"Axis {axis}: {len(mine)} of {len(members)} gyros {verb}, by the factor over the median: {listed}."
+            listed = "; ".join(
+                f"{one.gyro} ({one.figure} {significant(one.factor, 2)}×, {one.recording})" for one in mine
+            )
+            verb = "is" if len(mine) == 1 else "are"
+            text = f"Axis {axis}: {len(mine)} of {len(members)} gyros {verb} bad, × the median of the array: {listed}."
             found.append(Conclusion(text, "bad", f"{mine[0].recording}-{axis}"))
         elif set(members) <= tested:
             found.append(Conclusion(f"Axis {axis}: all {len(members)} gyros are healthy.", "good", f"axis-{axis}"))
     return found
-
-
-def _bad_words(dataset: DatasetPart, bad: BadGyro) -> str:
-    title = dataset.figures[bad.metric].title if bad.metric in dataset.figures else bad.metric
-    return f"{bad.gyro} ({title} {significant(bad.factor, 2)}× in {bad.recording})"
 
 
 def _rest_sentences(array: ArrayPart) -> list[Conclusion]:
@@ -177,6 +193,11 @@ def _rest_sentences(array: ArrayPart) -> list[Conclusion]:
 def _factor(value: Value) -> str:
     holds_one = value.low <= 1 <= value.high
     return interval(value) + (", not significant: the interval holds 1" if holds_one else "")
+
+
+def named(gyros: list[str]) -> str:
+    """Names, or how many where they are too many to read."""
+    return ", ".join(gyros) if len(gyros) <= MOST_NAMED else f"{len(gyros)} gyros"
 
 
 def interval(value: Value) -> str:
@@ -243,7 +264,7 @@ def _arch_sentences(dataset: DatasetPart) -> list[Conclusion]:
                     raw += [row["gyro"]] if rejects and row["series"] == "level" else []
                     left += [row["gyro"]] if rejects and row["series"] == "detrended" else []
         if raw:
-            verdict = "it is drift" if not left else f"it is more than drift for {', '.join(left)}"
+            verdict = "it is drift" if not left else f"it is more than drift for {named(left)}"
             text = f"ARCH effect of the level in {recording.name}: {len(raw)} of {tested} gyros; detrended: {len(left)}"
             found.append(Conclusion(f"{text}; {verdict}.", "", recording.arrays[0].anchor))
     return found
@@ -254,7 +275,7 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
     found = []
     unmeasured = nominal(dataset)
     if unmeasured:
-        whose = "every gyro" if len(unmeasured) == len(dataset.board.gyros) else ", ".join(unmeasured)
+        whose = "every gyro" if len(unmeasured) == len(dataset.board.gyros) else named(unmeasured)
         words = f"Nominal scale for {whose}: absolute figures carry the data sheet's error; factors do not."
         found.append(Conclusion(words, "warn", "calibration"))
     for recording in dataset.recordings:
@@ -262,7 +283,7 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
         falling = [gyro for array in recording.arrays for gyro in _falling(array)]
         if falling and recording.kind in AT_REST_KINDS:
             everyone = len(falling) == sum(len(array.gyros) for array in recording.arrays)
-            whose = "all gyros" if everyone else ", ".join(falling)
+            whose = "all gyros" if everyone else named(falling)
             text = f"{recording.name} is too short for the floor of {whose}: the Allan curve still falls at its end"
             found.append(Conclusion(f"{text}, so bias drift is an upper limit.", "warn", recording.arrays[0].anchor))
     for array in dataset.arrays:

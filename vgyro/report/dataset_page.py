@@ -105,7 +105,7 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
         "refused": [part.name for part in dataset.recordings if not part.usable],
         "duration_s": sum(float(part.integrity.get("duration_s") or 0) for part in usable),
         "scale": _scale(dataset),
-        "bad_gyros": [{"gyro": one.gyro, "axis": one.axis, "metric": one.metric, "factor": one.factor} for one in bad],
+        "bad_gyros": [{"gyro": one.gyro, "axis": one.axis, "figure": one.figure, "factor": one.factor} for one in bad],
         "best": best and _record(best),
         "status": "refused"
         if not usable

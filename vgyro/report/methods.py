@@ -33,7 +33,15 @@ DYNAMIC = ("error_mean", "error_sigma", "error_sigma_aligned", "error_sigma_scal
 HIGHER_IS_BETTER = ("if_sigma", "if_arw_1s", "if_bias_drift")
 LOWER_IS_BETTER = ("sigma", "bias_drift", "error_sigma", "error_sigma_aligned", "error_sigma_scaled")
 # Said of nearly every cell: a tooltip will do.
-ROUTINE = ("bootstrap of blocks", "two-sided,", "line through", "fitted from", "limits from the chi²")
+ROUTINE = (
+    "bootstrap of blocks",
+    "each pose's own mean",
+    "two-sided,",
+    "line through",
+    "fitted from",
+    "limits from the chi²",
+    "one-sided ",
+)
 NOT_SIGNIFICANT = "not significant"
 NOT_SHOWN = "not shown to exist"
 PROPERTIES = (
@@ -136,7 +144,7 @@ def _cell(value: Value | None, metric: str, notes: Notes, *, gyro: bool = False,
     if value.note.startswith(NOT_SHOWN):
         return Cell(f"< {significant(value.high, 2)}", tone="muted", hint=value.note)
     insignificant = value.note.startswith(NOT_SIGNIFICANT)
-    routine = insignificant or any(value.note.startswith(start) for start in ROUTINE)
+    routine = insignificant or all(clause.startswith(ROUTINE) for clause in value.note.split("; "))
     return number_cell(
         value.value,
         value.low,

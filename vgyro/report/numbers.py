@@ -88,7 +88,7 @@ def _grouped(value: float, decimals: int) -> str:
     # A four-digit number reads better in one piece.
     if abs(value) < 9999.5:
         text = text.replace(THIN_SPACE, "")
-    return _signed("0" if decimals == 0 and text in {"-0", "0"} else text)
+    return _signed(text if text.strip("-0.") else text.removeprefix("-"))
 
 
 def _signed(text: str) -> str:

@@ -13,7 +13,7 @@ from vgyro.report.numbers import MISSING, count, duration, percent, plain
 from vgyro.report.tables import Cell, Column, Row, Tone, render_table
 
 MOST_LISTED = 50
-MOST_NAMED = 8
+MOST_NAMED = 3
 STUCK_S = 1.0
 TONES: dict[str, Tone] = {"good": "good", "suspect": "warn", "refused": "bad"}
 COLUMNS = (
@@ -65,9 +65,10 @@ def _longest_gap(gaps: list[Mapping[str, Any]]) -> str:
 
 def channel_words(channels: Mapping[str, Any], longest: float = STUCK_S) -> str:
     """Channels that are clipped, or repeat one value for more than `longest` s, in words."""
+    most = sorted(channels.items(), key=lambda item: -item[1]["clipped"])
     clipped = [
         f"{name} ({count(record['clipped'])}, {percent(record['clipped_share'], 2)})"
-        for name, record in channels.items()
+        for name, record in most
         if record["clipped"]
     ]
     stuck = [

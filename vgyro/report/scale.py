@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from vgyro.report.html import join, paragraph
+from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import DatasetPart
 from vgyro.report.numbers import MISSING, significant
 from vgyro.report.plots import Axis, Curve, curve_plot
 from vgyro.report.tables import Cell, Column, number_cell, render_table
 
 NAN = float("nan")
+FEW = 8
 NOMINAL_WORDS = (
     "Nominal scale: there is no calibration recording for these gyros, so the board's data-sheet values are used, and "
     "every figure below in deg/s, deg/h or deg/√h carries their error (several percent for most MEMS gyros)."
@@ -41,9 +42,12 @@ def calibration_part(dataset: DatasetPart) -> Markup:
     axes = {gyro.name: gyro.axis for gyro in dataset.board.gyros}
     warning = paragraph(NOMINAL_WORDS, "warn") if nominal(dataset) else Markup("")
     table = render_table(COLUMNS, [_row(name, axes.get(name, MISSING), record) for name, record in gyros.items()])
+    skipped = dataset.calibration.get("skipped") or {}
+    remarks = [paragraph(f"{name} gave no calibration: {reason}", "warn") for name, reason in skipped.items()]
+    warning = join(warning, *remarks)
     measured = {name: record for name, record in gyros.items() if record.get("points")}
     if not measured:
-        return join(warning, table)
+        return join(warning, details(f"Nominal values of {len(gyros)} gyros", table) if len(gyros) > FEW else table)
     return join(warning, table, paragraph(FLOOR_WORDS, "note"), _plots(measured))
 
 
