@@ -70,6 +70,15 @@ def test_csv_has_one_line_a_reading_and_names_what_is_ours():
     assert float(printed["implied"]) == pytest.approx(2.31, abs=0.005)
 
 
+def test_a_reading_of_another_quantity_is_shown_and_not_compared():
+    paper = load_paper("liu2015")
+    comparison = compare(paper, paper.table(1), everything(paper), implied_cells(paper))
+    level, detrended, standardised = comparison.at("Gyro 1", "LM-Statistic")
+    assert level.agreement == "differs"
+    assert detrended.ours.known
+    assert {detrended.agreement, standardised.agreement} == {"none"}
+
+
 def test_csv_of_an_absent_figure_is_empty_with_a_reason():
     paper = load_paper("liu2015")
     lines = list(

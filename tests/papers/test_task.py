@@ -147,7 +147,7 @@ def test_every_first_reading_is_found(made):
 
 
 def test_the_page_shows_tables_claims_and_the_mark(made):
-    for paper, title in (("jiang2012", "Table 3: dynamic tests"), ("liu2015", "Table 3: virtual gyroscope")):
+    for paper, title in (("jiang2012", "Table 3: Dynamic tests"), ("liu2015", "Table 3: Virtual gyroscope")):
         page = made[paper]["page"].decode()
         for text in (title, "SIMULATED", "does not hold", "cannot be decided", "published", "implied"):
             assert text in page

@@ -28,7 +28,7 @@ class Cell:
     published : as printed; None in a row or column of ours
     implied   : None in a row or column of ours
     agreement : of ours with published: within our 95 % interval (and the rounding of the print), within 10 %, differs,
-                none where one of the two is missing
+                none where one of the two is missing or the reading is of another quantity
     reason    : why there is no figure of ours; empty where there is one
     """
 
@@ -85,7 +85,7 @@ def _cells(
                     ours = _in_unit(ours, unit)
                     yield Cell(
                         table.number, row.name, column.name, unit, published, follows, variant.name, ours,
-                        agreement(published, ours), "" if ours.known else ours.reason,
+                        agreement(published if variant.compared else None, ours), "" if ours.known else ours.reason,
                     )  # fmt: skip
 
 

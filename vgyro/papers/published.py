@@ -33,6 +33,7 @@ class Variant(StrictModel):
     name: str
     columns: tuple[str, ...] | None = Field(None, description="columns that it covers; null: all")
     rows: tuple[str, ...] | None = Field(None, description="rows that it covers; null: all")
+    compared: bool = Field(True, description="false: another quantity, shown beside the printed one")
     select: Selection = Field({})
 
 

@@ -15,6 +15,13 @@ from vgyro.report.page import Section, render_page
 
 TONES: dict[Agreement, tables.Tone] = {"within interval": "good", "within 10 %": "warn", "differs": "bad", "none": ""}
 VERDICT_TONES = {"holds": "good", "does not hold": "bad", "cannot be decided": "warn"}
+COUNTED: dict[Agreement, str] = {
+    "within interval": "within our interval",
+    "within 10 %": "within 10 %",
+    "differs": "differ",
+    "none": "without a figure of ours",
+}
+OUTCOMES = {"holds": "hold", "does not hold": "do not hold", "cannot be decided": "cannot be decided"}
 LEGEND = (
     "Ours is simulated; its limits are 95 %, where a method gives them. Its colour compares it with the published "
     "figure: green, that lies within our limits (or rounding); amber, within 10 %; red, it differs. A difference is a "
@@ -46,7 +53,7 @@ def paper_page(
 
 def _title(comparison: Comparison) -> str:
     table = comparison.table
-    return table.title if table.number == "text" else f"Table {table.number}: {table.title.lower()}"
+    return table.title if table.number == "text" else f"Table {table.number}: {table.title}"
 
 
 def _what(paper: Paper, comparisons: Sequence[Comparison], verdicts: Sequence[tuple[Claim, Verdict]]) -> Markup:
@@ -57,8 +64,8 @@ def _what(paper: Paper, comparisons: Sequence[Comparison], verdicts: Sequence[tu
         for column in part.table.columns
         if (readings := part.at(row.name, column.name))
     ]
-    counted = [(name, sum(cell.agreement == name for cell in firsts)) for name in TONES]
-    outcomes = [(name, sum(verdict.outcome == name for _, verdict in verdicts)) for name in VERDICT_TONES]
+    counted = [(word, sum(cell.agreement == name for cell in firsts)) for name, word in COUNTED.items()]
+    outcomes = [(word, sum(verdict.outcome == name for _, verdict in verdicts)) for name, word in OUTCOMES.items()]
     return html.join(
         html.paragraph(
             "The published tables again: a simulated board, built from the figures that the paper gives, was recorded "
