@@ -276,7 +276,7 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
     unmeasured = nominal(dataset)
     if unmeasured:
         whose = "every gyro" if len(unmeasured) == len(dataset.board.gyros) else named(unmeasured)
-        words = f"Nominal scale for {whose}: absolute figures carry the data sheet's error; factors do not."
+        words = f"Nominal scale for {whose}: absolute figures carry the data sheet's error."
         found.append(Conclusion(words, "warn", "calibration"))
     for recording in dataset.recordings:
         found += _incomplete(recording)

@@ -50,11 +50,12 @@ PROPERTIES = (
     ("noise_bandwidth_hz", Column("noise bandwidth", "Hz", group="the method itself")),
     ("delay_s", Column("delay", "s", group="the method itself")),
 )
+LIMITS = "Below each figure: 95 % limits."
 GENERAL = (
     "Improvement factor: mean of the figure over the single gyros / figure of the method (Liu et al. 2015, eq. 18). "
     "Grey: its 95 % interval holds 1, so no improvement is shown. Bold on green: the best of the methods. A filter "
     "that narrows the bandwidth lowers 1σ and the ARW read at 1 s by itself: compare methods of equal bandwidth. "
-    "Below each figure: 95 % limits."
+    f"{LIMITS}"
 )
 
 
@@ -66,7 +67,9 @@ def rest_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
     if not groups:
         return paragraph("No figures at rest: the recording holds too little data at rest.", "note")
     caption = f"Gyros and methods at rest, axis {array.axis}, recording {array.recording}"
-    return join(_table(dataset.figures, array, groups, caption), paragraph(GENERAL, "note"))
+    return join(
+        _table(dataset.figures, array, groups, caption), paragraph(GENERAL if array.methods() else LIMITS, "note")
+    )
 
 
 def dynamic_table(dataset: DatasetPart, array: ArrayPart) -> Markup:

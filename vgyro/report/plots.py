@@ -128,7 +128,9 @@ def _mark_spans(plot: figure, spans: Sequence[tuple[float, float]]) -> None:
     from bokeh.models import BoxAnnotation
 
     for start, stop in spans:
-        plot.add_layout(BoxAnnotation(left=start, right=stop, fill_color=ACCENT, fill_alpha=0.08, level="underlay"))
+        plot.add_layout(
+            BoxAnnotation(left=start, right=stop, fill_color=ACCENT, fill_alpha=0.08, line_color=None, level="underlay")
+        )
 
 
 def _mark_levels(plot: figure, levels: Sequence[float]) -> None:

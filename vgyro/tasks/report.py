@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vgyro.board import Board
+from vgyro.config import DEFINITIONS
 from vgyro.dataset import Manifest
 from vgyro.metrics.figures import FIGURES
 from vgyro.report.dataset_page import headline, render_dataset
@@ -113,7 +114,8 @@ def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tupl
                 tables[place.table] = read_columns(path)
         if tables:
             gyros = tuple(gyro.name for gyro in board.array(axis))
-            arrays.append(ArrayPart(recording, axis, gyros, tables, volatility))
+            ordered = {name: volatility[name] for name in DEFINITIONS if name in volatility}
+            arrays.append(ArrayPart(recording, axis, gyros, tables, ordered))
     return tuple(arrays)
 
 
