@@ -115,7 +115,7 @@ def test_look_up_by_columns():
     found = look_up(evidence, {**select, "absolute": True})
     assert (found.value, found.low, found.high) == (0.1, 0.05, 0.2)
     assert (found.unit, found.notes) == ("deg/s", ("n",))
-    assert look_up(evidence, {**select, "metric": "sigma"}).reason == "too short"
+    assert look_up(evidence, {**select, "metric": "sigma"}).reason == "value is not defined: too short"
     assert "no such row" in look_up(evidence, {**select, "metric": "arw"}).reason
     assert "no gyro9" in look_up(evidence, {**select, "method": "$gyro9"}).reason
 

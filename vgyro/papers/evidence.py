@@ -69,7 +69,7 @@ def look_up(evidence: Evidence, select: Mapping[str, Any]) -> Ours:
     note = str(row.get("note") or row.get("status") or "")
     unit = str(row["unit"]) if "unit" in row and unit == "unit" else ("" if unit == "unit" else str(unit))
     if math.isnan(value):
-        return Ours(math.nan, source=source, reason=note or f"{column} is not defined there")
+        return Ours(math.nan, source=source, reason=_why_undefined(column, note))
     if absolute:
         value, below, above = _magnitude(value, below, above)
     return Ours(value, below, above, unit, source, notes=(note,) if note and note != "ok" else ())
@@ -105,6 +105,12 @@ def with_single(rows: Iterable[dict[str, Any]], gyros: Sequence[str]) -> list[di
 
 
 _AT_REST = ("static",)
+
+
+def _why_undefined(column: str, note: str) -> str:
+    if note == "boundary":
+        return f"{column} is not defined: the estimate lies on the boundary of its range"
+    return f"{column} is not defined: {note}" if note else f"{column} is not defined"
 
 
 def _named(value: Any, gyros: Sequence[str]) -> Any:
