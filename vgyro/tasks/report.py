@@ -114,7 +114,9 @@ def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tupl
                 tables[place.table] = read_columns(path)
         if tables:
             gyros = tuple(gyro.name for gyro in board.array(axis))
-            ordered = {name: volatility[name] for name in DEFINITIONS if name in volatility}
+            ordered: dict[str, dict[str, Table]] = {
+                name: volatility[name] for name in DEFINITIONS if name in volatility
+            }
             arrays.append(ArrayPart(recording, axis, gyros, tables, ordered))
     return tuple(arrays)
 
