@@ -141,3 +141,16 @@ def percentile_limits(replicates: np.ndarray, confidence: float) -> tuple[np.nda
     tail = (1 - confidence) / 2
     low, high = np.quantile(replicates, [tail, 1 - tail], axis=0)
     return low, high
+
+
+def scale_limits(value: float, replicates: np.ndarray, confidence: float) -> tuple[float, float]:
+    """Limits of a figure of size (a 1σ, a ratio): percentiles of replicates [R], moved by a factor to have the figure
+    itself as their median.
+
+    Blocks are shorter than a slow drift and lose a part of it, so that plain percentiles may miss the figure.
+    """
+    tail = (1 - confidence) / 2
+    median = float(np.median(replicates))
+    factor = value / median if median > 0 else 1.0
+    low, high = (factor * float(limit) for limit in np.quantile(replicates, [tail, 1 - tail]))
+    return low, high

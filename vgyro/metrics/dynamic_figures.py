@@ -104,7 +104,12 @@ def _factors(
     for name, of, replicates in (("if_mean", "error_mean", drawn.mean), ("if_sigma", "error_sigma", drawn.sigma)):
         figures = np.array([row[of].value for row in readings[:singles]])
         factor = improvement_factor(
-            figures, readings[column][of].value, replicates[:, :singles], replicates[:, column], confidence
+            figures,
+            readings[column][of].value,
+            replicates[:, :singles],
+            replicates[:, column],
+            confidence,
+            name != "if_mean",
         )
         note = f"{factor.note}; {OF_ERROR}".removeprefix("; ")
         factors[name] = Reading(factor.value, factor.low, factor.high, note)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from vgyro.metrics.bootstrap import percentile_limits, scale_limits
 from vgyro.metrics.figures import Reading
 
 NOT_SIGNIFICANT = "not significant"
@@ -18,12 +19,14 @@ def improvement_factor(
     singles_replicates: np.ndarray,
     virtual_replicates: np.ndarray,
     confidence: float = 0.95,
+    of_size: bool = True,
 ) -> Reading:
     """IF = mean of a figure over the single gyros / the figure of the virtual gyro (Liu et al. 2015, eq. 18).
 
     singles [N], virtual : the figure, its absolute value is taken (a mean may be negative)
     singles_replicates [R, N], virtual_replicates [R] : the same figures of series resampled together, so that what
     the virtual gyro shares with its members does not widen the interval
+    of_size : the figure is a size (1σ, ARW), not a mean: limits as in scale_limits
     returns : Reading, limits by percentiles; note "not significant" where they hold 1
     """
     if virtual == 0 or not math.isfinite(virtual):
@@ -34,8 +37,10 @@ def improvement_factor(
     ratios = ratios[np.isfinite(ratios)]
     if ratios.size == 0:
         return Reading(value, math.nan, math.nan, "no interval: the resampled figure is zero")
-    tail = (1 - confidence) / 2
-    low, high = (float(limit) for limit in np.quantile(ratios, [tail, 1 - tail]))
+    if of_size:
+        low, high = scale_limits(value, ratios, confidence)
+    else:
+        low, high = (float(limit[0]) for limit in percentile_limits(ratios[:, None], confidence))
     return Reading(value, low, high, _note(low, high))
 
 

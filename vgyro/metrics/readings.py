@@ -9,7 +9,7 @@ import numpy as np
 
 from vgyro import units
 from vgyro.metrics.allan import AllanCurve, read_curve
-from vgyro.metrics.bootstrap import Units, percentile_limits, resample
+from vgyro.metrics.bootstrap import Units, percentile_limits, resample, scale_limits
 from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, low_pass_factor
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.spectrum import Spectrum, flat_band, noise_density
@@ -63,11 +63,11 @@ def moments(
     centred = one.squares[:, 0] - 2 * mean * one.total[:, 0] + one.count * mean**2
     sigma = math.sqrt(max(centred.sum(), 0.0) / max(count - 1, 1))
     note = f"bootstrap of blocks of {drawn.block} s"
-    readings = {}
-    for name, value, found in (("mean", mean, drawn.mean), ("sigma", sigma, drawn.sigma)):
-        low, high = percentile_limits(found, confidence)
-        readings[name] = Reading(float(value), float(low[0]), float(high[0]), note)
-    return readings
+    low, high = percentile_limits(drawn.mean, confidence)
+    return {
+        "mean": Reading(float(mean), float(low[0]), float(high[0]), note),
+        "sigma": Reading(sigma, *scale_limits(sigma, drawn.sigma[:, 0], confidence), note),
+    }
 
 
 def bias_drift(curve: AllanCurve) -> tuple[Reading, Reading]:

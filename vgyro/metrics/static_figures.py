@@ -111,7 +111,12 @@ def _factors(
     for name, replicates in (("mean", drawn.mean), ("sigma", drawn.sigma), ("arw_1s", drawn.adev_1s)):
         figures = np.array([row[name].value for row in readings[:singles]])
         factors[f"if_{name}"] = improvement_factor(
-            figures, readings[column][name].value, replicates[:, :singles], replicates[:, column], confidence
+            figures,
+            readings[column][name].value,
+            replicates[:, :singles],
+            replicates[:, column],
+            confidence,
+            name != "mean",
         )
     if "band-limited" in readings[column]["arw_1s"].note:
         limited = factors["if_arw_1s"]
