@@ -9,8 +9,7 @@ import numpy as np
 
 from vgyro.config import CorrelationModel, Mode
 from vgyro.engine.models import FAILED, NOT_POSITIVE_DEFINITE
-from vgyro.fusion.weights import min_variance_weights
-from vgyro.fusion.weights import usable
+from vgyro.fusion.weights import min_variance_weights, usable
 from vgyro.storage.tables import TableWriter, read_columns
 from vgyro.tasks.common import Task
 from vgyro.tasks.volatility_series import WHOLE, ArraySeries, open_series, stored_garch
