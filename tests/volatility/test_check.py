@@ -21,8 +21,8 @@ def garch_series(samples, alpha, beta, seed):
 
 @pytest.mark.parametrize(("alpha", "beta"), [(0.05, 0.9), (0.3, 0.3), (0.0, 0.0)])
 def test_the_grid_is_never_worse_than_the_library(alpha, beta):
-    # Expected: no likelihood above the one found here, and arch's equal to it where it converged. At α = 0 the fit takes
-    # a constant variance by definition, where β ≈ 1 may still win a little by a trend in the variance.
+    # Expected: no likelihood above the one found here, and arch's equal to it where it converged. At α = 0 the fit
+    # takes a constant variance by definition, where β ≈ 1 may still win a little by a trend in the variance.
     series = np.column_stack([garch_series(360, alpha, beta, seed) for seed in range(4)])
     fit = fit_garch(series)
     ours = np.array([greatest_log_likelihood(column) for column in series.T])
