@@ -14,7 +14,9 @@ from vgyro.storage.inputs import BOARDS
 from vgyro.storage.parquetlog import LogReader
 
 
-def decode_dump(paths: Sequence[str | Path], board: Board, options: IntegrityOptions | None = None) -> Frames:
+def decode_dump(
+    paths: str | Path | Sequence[str | Path], board: Board, options: IntegrityOptions | None = None
+) -> Frames:
     """Decode the dumps of one recording, in order, as one stream; plain, .gz or .zst.
 
     returns : Frames with counts {channel: [T]}, counter [T], time [T] s, segment [T] and the integrity record
