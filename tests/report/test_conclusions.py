@@ -35,6 +35,15 @@ def with_metric(dataset: DatasetPart, method: str, metric: str, value: float) ->
     return with_array(dataset, array, {"metrics": table})
 
 
+def with_g4_at(dataset: DatasetPart, sigma: float, arw: float, allan: float) -> DatasetPart:
+    """The data set with the noisy gyro at these multiples of the median of the other three."""
+    values = array_of(dataset).values()
+    for metric, factor in (("sigma", sigma), ("arw_1s", arw)):
+        median = float(np.median([values[gyro, ""][metric].value for gyro in GYROS[:3]]))
+        dataset = with_metric(dataset, "g4", metric, factor * median)
+    return with_allan(dataset, "g4", allan)
+
+
 def with_array(dataset: DatasetPart, array: ArrayPart, tables: dict) -> DatasetPart:
     """The data set with some tables of one array changed."""
     changed = replace(array, tables={**array.tables, **tables})
@@ -59,7 +68,7 @@ def with_allan(dataset: DatasetPart, gyro: str, factor: float, from_tau: float =
 
 
 def test_a_gyro_that_is_bad_at_long_times_only_is_found(dataset: DatasetPart) -> None:
-    quiet = with_allan(with_metric(dataset, "g4", "sigma", 0.05), "g4", 1.0)
+    quiet = with_g4_at(dataset, 1.0, 1.0, 1.0)
     assert bad_gyros(quiet) == []
     (bad,) = bad_gyros(with_allan(quiet, "g1", 3.5, from_tau=50.0))
     assert bad.gyro == "g1"
@@ -67,7 +76,7 @@ def test_a_gyro_that_is_bad_at_long_times_only_is_found(dataset: DatasetPart) ->
 
 
 def test_a_tone_above_the_shortest_averaging_time_is_not_held_against_a_gyro(dataset: DatasetPart) -> None:
-    quiet = with_allan(with_metric(dataset, "g4", "sigma", 0.05), "g4", 1.0)
+    quiet = with_g4_at(dataset, 1.0, 1.0, 1.0)
     array = array_of(quiet)
     table = {name: column.copy() for name, column in array.tables["allan"].items()}
     mask = (table["series"] == "g2") & (table["tau"] < 0.1)
@@ -86,9 +95,15 @@ def test_the_noisy_gyro_is_named_with_its_factor(dataset: DatasetPart) -> None:
 
 
 def test_a_gyro_just_inside_the_rule_is_healthy(dataset: DatasetPart) -> None:
-    dataset = with_allan(with_metric(dataset, "g4", "sigma", 1.9 * 0.051), "g4", 1.9)
+    dataset = with_g4_at(dataset, 1.9, 1.4, 1.9)
     assert bad_gyros(dataset) == []
     assert any(one.tone == "good" and "all 4 gyros" in one.text for one in conclude(dataset))
+
+
+@pytest.mark.parametrize(("arw", "bad"), [(1.45, False), (1.6, True)])
+def test_arw_has_the_tighter_rule(dataset: DatasetPart, arw: float, bad: bool) -> None:
+    found = [one.gyro for one in bad_gyros(with_g4_at(dataset, 1.0, arw, 1.0))]
+    assert found == (["g4"] if bad else [])
 
 
 def test_the_best_method_and_the_best_of_full_bandwidth(dataset: DatasetPart) -> None:

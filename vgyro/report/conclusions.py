@@ -16,8 +16,9 @@ from vgyro.report.tables import Tone
 from vgyro.report.volatility import LEVEL_OF_TEST
 
 BAD_FACTOR = 2.0
+BAD_ARW_FACTOR = 1.5
 FEWEST_GYROS = 3
-SHORTEST_TAU = 0.1
+SHORTEST_TAU = 1.0
 MOST_NAMED = 6
 SIMPLE = ("average", "median", "inverse_variance_arw")
 MOST_LOST = 1e-4
@@ -25,9 +26,9 @@ AT_REST_KINDS = ("static", "thermal", "free")
 REST_FACTORS = (("if_sigma", "1σ"), ("if_bias_drift", "bias drift"))
 STILL_FALLS = "the curve still falls"
 BAD_RULE = (
-    f"A gyro is called bad where its 1σ at rest, or its Allan deviation at an averaging time from {SHORTEST_TAU:g} s "
-    f"up, is more than {BAD_FACTOR:g} times the median of its array ({FEWEST_GYROS} gyros or more); for the Allan "
-    "deviation its 95 % interval must lie above that median too."
+    f"A gyro is called bad where, at rest, its 1σ or its Allan deviation at {SHORTEST_TAU:g} s or longer is more than "
+    f"{BAD_FACTOR:g} times the median of its array, or its ARW read at 1 s more than {BAD_ARW_FACTOR:g} times "
+    f"({FEWEST_GYROS} gyros or more); the lower 95 % limit counts."
 )
 BEST_RULE = (
     "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording "
@@ -98,41 +99,45 @@ def bad_gyros(dataset: DatasetPart) -> list[BadGyro]:
     """Gyros far above the median of their array, each with its worst figure, the worst gyro first."""
     worst: dict[str, BadGyro] = {}
     for array in at_rest(dataset):
-        for bad in (*_wide(array), *_noisy(array)):
-            if bad.factor > BAD_FACTOR and (bad.gyro not in worst or bad.factor > worst[bad.gyro].factor):
+        found = [
+            *_by_figure(array, "sigma", "1σ", BAD_FACTOR),
+            *_by_figure(array, "arw_1s", "ARW at 1 s", BAD_ARW_FACTOR),
+        ]
+        for bad in (*found, *_by_curve(array)):
+            if bad.gyro not in worst or bad.factor > worst[bad.gyro].factor:
                 worst[bad.gyro] = bad
     return sorted(worst.values(), key=lambda bad: -bad.factor)
 
 
-def _wide(array: ArrayPart) -> list[BadGyro]:
-    """1σ of each gyro against the median of the array."""
+def _by_figure(array: ArrayPart, metric: str, words: str, limit: float) -> list[BadGyro]:
+    """Gyros whose figure is above `limit` times the median of the array."""
     values = array.values()
-    sigma = {gyro: values[gyro, ""]["sigma"].value for gyro in array.gyros if "sigma" in values.get((gyro, ""), {})}
-    sigma = {gyro: value for gyro, value in sigma.items() if np.isfinite(value)}
-    median = statistics.median(sigma.values()) if len(sigma) >= FEWEST_GYROS else 0.0
-    if median <= 0:
-        return []
-    return [BadGyro(gyro, array.axis, array.recording, "1σ", value / median) for gyro, value in sigma.items()]
+    known = {gyro: values[gyro, ""][metric] for gyro in array.gyros if metric in values.get((gyro, ""), {})}
+    return _above(array, words, limit, {gyro: (value.value, value.low) for gyro, value in known.items() if value.known})
 
 
-def _noisy(array: ArrayPart) -> list[BadGyro]:
-    """Allan deviation of each gyro against the median of the array, at the τ where it is worst."""
-    table = array.tables.get("allan", {})
-    curves: dict[float, list[tuple[str, float, float]]] = {}
-    for row in rows_of(table):
-        if row["series"] in array.gyros and row["tau"] >= SHORTEST_TAU and np.isfinite(row["deviation"]):
-            point = (str(row["series"]), float(row["deviation"]), float(row["low"]))
-            curves.setdefault(float(row["tau"]), []).append(point)
-    found = []
-    for tau, points in curves.items():
-        median = statistics.median(deviation for _, deviation, _ in points) if len(points) >= FEWEST_GYROS else 0.0
-        words = f"Allan deviation at τ = {significant(tau, 2)} s"
-        found += [
-            BadGyro(gyro, array.axis, array.recording, words, deviation / median)
-            for gyro, deviation, low in points
-            if median > 0 and low > median
-        ]
-    return found
+def _by_curve(array: ArrayPart) -> list[BadGyro]:
+    """Gyros whose Allan deviation is too high at some τ."""
+    curves: dict[float, dict[str, tuple[float, float]]] = {}
+    for row in rows_of(array.tables.get("allan", {})):
+        # The τ nearest to 1 s may lie a little below it.
+        if row["series"] in array.gyros and row["tau"] > 0.9 * SHORTEST_TAU and np.isfinite(row["deviation"]):
+            curves.setdefault(float(row["tau"]), {})[str(row["series"])] = (float(row["deviation"]), float(row["low"]))
+    return [
+        bad
+        for tau, points in curves.items()
+        for bad in _above(array, f"Allan deviation at τ = {significant(tau, 2)} s", BAD_FACTOR, points)
+    ]
+
+
+def _above(array: ArrayPart, words: str, limit: float, known: dict[str, tuple[float, float]]) -> list[BadGyro]:
+    """Gyros (value, lower limit) with the lower limit above `limit` times the median of the values."""
+    median = statistics.median(value for value, _ in known.values()) if len(known) >= FEWEST_GYROS else 0.0
+    return [
+        BadGyro(gyro, array.axis, array.recording, words, value / median)
+        for gyro, (value, low) in known.items()
+        if median > 0 and low > limit * median
+    ]
 
 
 def best_method(array: ArrayPart, metric: str, *, full_bandwidth: bool = False) -> Best | None:
@@ -288,7 +293,8 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
             found.append(Conclusion(f"{text}, so bias drift is an upper limit.", "warn", recording.arrays[0].anchor))
     for array in dataset.arrays:
         if failed := failures(array):
-            text = f"{failed} cross-check comparisons failed (axis {array.axis}, {array.recording})."
+            noun = "comparison" if failed == 1 else "comparisons"
+            text = f"{failed} cross-check {noun} failed (axis {array.axis}, {array.recording})."
             found.append(Conclusion(text, "bad", array.anchor))
     return found
 
