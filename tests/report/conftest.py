@@ -90,7 +90,13 @@ def integrity(name: str) -> dict[str, Any]:
                 "content_bytes": 123456,
             }
         ],
-        "frames": {"good": 60_000, "bad": 3, "lost": 25 if held else 0, "repeated": 0, "good_share": 0.9995},
+        "frames": {
+            "good": 60_000,
+            "bad": 3,
+            "lost": 25 if held else 0,
+            "repeated": 0,
+            "good_share": 0.9951 if held else 0.9999,
+        },
         "duration_s": 1200.0,
         "rate_hz": 50.0,
         "declared_rate_hz": 50.0,

@@ -124,7 +124,7 @@ def test_limits_are_said(dataset: DatasetPart) -> None:
     assert "Nominal scale for solo" in text
     assert "Recording broken was refused: only 12 % of its frames are good." in text
     assert "rest is too short for the floor of g1, g2" in text
-    assert "rest lacks 0.05\u2009% of its frames" in text
+    assert "rest lacks 0.49\u2009% of its frames" in text
 
 
 def test_drift_is_not_called_arch(dataset: DatasetPart) -> None:

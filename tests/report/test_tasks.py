@@ -91,7 +91,7 @@ def test_a_passed_cross_check_is_closed_and_a_failed_one_open(page: str, builder
     report.main(task)
     failed = task.output("page").read_text(encoding="utf-8")
     assert "<details open>\n<summary>Cross-check: 1 of 3 comparisons FAILED" in failed
-    assert "1 cross-check comparison failed (axis x, rest)" in failed
+    assert "The cross-check failed in 4 comparisons (rest, axis x; rest, axis z; sine, axis x; sine, axis z)" in failed
 
 
 def test_the_same_artefacts_give_the_same_bytes(page: str, builder: ModuleType, tmp_path: Path) -> None:

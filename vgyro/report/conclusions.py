@@ -21,7 +21,7 @@ FEWEST_GYROS = 3
 SHORTEST_TAU = 1.0
 MOST_NAMED = 6
 SIMPLE = ("average", "median", "inverse_variance_arw")
-MOST_LOST = 1e-4
+MOST_LOST = 1e-3
 AT_REST_KINDS = ("static", "thermal", "free")
 REST_FACTORS = (("if_sigma", "1σ"), ("if_bias_drift", "bias drift"))
 STILL_FALLS = "the curve still falls"
@@ -291,11 +291,14 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
             whose = "all gyros" if everyone else named(falling)
             text = f"{recording.name} is too short for the floor of {whose}: the Allan curve still falls at its end"
             found.append(Conclusion(f"{text}, so bias drift is an upper limit.", "warn", recording.arrays[0].anchor))
-    for array in dataset.arrays:
-        if failed := failures(array):
-            noun = "comparison" if failed == 1 else "comparisons"
-            text = f"{failed} cross-check {noun} failed (axis {array.axis}, {array.recording})."
-            found.append(Conclusion(text, "bad", array.anchor))
+    failed = {array.anchor: failures(array) for array in dataset.arrays if failures(array)}
+    if failed:
+        places = "; ".join(
+            f"{array.recording}, axis {array.axis}" for array in dataset.arrays if array.anchor in failed
+        )
+        total = sum(failed.values())
+        text = f"The cross-check failed in {total} {'comparison' if total == 1 else 'comparisons'} ({places})."
+        found.append(Conclusion(text, "bad", next(iter(failed))))
     return found
 
 

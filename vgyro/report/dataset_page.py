@@ -75,7 +75,7 @@ def _child(dataset: DatasetPart, array: ArrayPart, opened: bool) -> Section:
         rates_plots(recording, array),
         temperature_plot(recording) if first else "",
         heading("Correlation", 4),
-        correlation_table(array),
+        correlation_table(recording, array),
         volatility_part(array),
         heading("Noise", 4),
         allan_plot(array),
@@ -97,7 +97,7 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
     return {
         "dataset": dataset.name,
         "title": dataset.title,
-        "board": dataset.board.title or dataset.board.name,
+        "board": dataset.board.name,
         "simulated": dataset.manifest.simulated,
         "gyros": len(dataset.board.gyros),
         "axes": list(dataset.board.axes),

@@ -60,10 +60,12 @@ GENERAL = (
 
 
 def rest_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
-    """Every figure of a recording at rest, gyros first, then methods."""
-    groups = [(name, group) for name, group in REST if _has(array, name)]
+    """Every figure of a recording at rest, gyros first, then methods; empty if only errors in motion are known."""
+    groups = [(name, group) for name, group in REST if _has(array, name)] if _has(array, "sigma") else []
     order = list(dict.fromkeys(group for _, group in groups))
     groups.sort(key=lambda pair: order.index(pair[1]))
+    if not groups and _has(array, "error_sigma"):
+        return Markup("")
     if not groups:
         return paragraph("No figures at rest: the recording holds too little data at rest.", "note")
     caption = f"Gyros and methods at rest, axis {array.axis}, recording {array.recording}"
@@ -77,8 +79,14 @@ def dynamic_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
     present = [(name, "error against the reference") for name in DYNAMIC if _has(array, name)]
     if not present:
         return Markup("")
+    if not _has(array, "sigma"):
+        # Without rest these two are the factors of the errors.
+        factors = [(name, "improvement factor of the error") for name in ("if_sigma", "if_mean") if _has(array, name)]
+        present = [*factors, *present]
     caption = f"Errors against the reference rate, axis {array.axis}, recording {array.recording}"
-    return _table(dataset.figures, array, present, caption)
+    return join(
+        _table(dataset.figures, array, present, caption), paragraph(GENERAL if array.methods() else LIMITS, "note")
+    )
 
 
 def _has(array: ArrayPart, metric: str) -> bool:

@@ -16,7 +16,7 @@ from vgyro.report.plots import Axis, Curve, curve_plot
 # What a first look needs; the rest is one click away.
 SHOWN = ("average", "inverse_variance_arw", "jiang_random_walk", "dcc_causal")
 SPECTRUM_POINTS = 700
-GYROS, METHODS = "single gyros", "methods (the others are hidden at first: click to show them)"
+GYROS, METHODS = "single gyros", "methods (faded ones are hidden: click to show them)"
 
 
 def allan_plot(array: ArrayPart) -> Markup:

@@ -71,6 +71,8 @@ def duration(seconds: float) -> str:
     """A length of time in the unit that a person would choose."""
     if not math.isfinite(seconds):
         return MISSING
+    if 0 < seconds < 0.1:
+        return f"{significant(1000 * seconds)} ms"
     if seconds < 120:
         return f"{significant(seconds)} s"
     if seconds < 7200:

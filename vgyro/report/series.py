@@ -80,8 +80,8 @@ def temperature_plot(recording: RecordingPart) -> Markup:
     return curve_plot(identifier, "Temperature", curves, TIME, Axis("temperature, °C"), height=240)
 
 
-def correlation_table(array: ArrayPart) -> Markup:
-    """Correlation matrix of the gyros' noise as a coloured table, limits as tooltips."""
+def correlation_table(recording: RecordingPart, array: ArrayPart) -> Markup:
+    """Correlation matrix of the gyros' noise as a coloured table, limits below each factor."""
     table = array.tables.get("correlation")
     if table is None or len(array.gyros) < 2:
         return paragraph("One gyro: there is no correlation matrix.", "note")
@@ -91,7 +91,9 @@ def correlation_table(array: ArrayPart) -> Markup:
         [Cell(name), *(_correlation_cell(found.get((name, other)), name == other) for other in array.gyros)]
         for name in array.gyros
     ]
-    caption = "Correlation factors of the gyros' noise (Jiang et al. 2012, eq. 22); below, 95 % limits"
+    still = recording.rates is None or bool(recording.rates["at_rest"].any())
+    of = "samples at rest" if still else "rate − reference"
+    caption = f"Correlation factors of the gyros' noise, {of} (Jiang et al. 2012, eq. 22); below, 95 % limits"
     return render_table(columns, rows, caption, compact=True)
 
 
@@ -101,5 +103,5 @@ def _correlation_cell(row: dict | None, diagonal: bool) -> Cell:
     value, low, high = float(row["correlation"]), float(row["low"]), float(row["high"])
     if diagonal:
         return Cell("1", tone="muted")
-    below = f"{rounded(low, 2)} … {rounded(high, 2)}" if np.isfinite(low) and np.isfinite(high) else ""
+    below = f"{rounded(low, 3)} … {rounded(high, 3)}" if np.isfinite(low) and np.isfinite(high) else ""
     return Cell(rounded(value, 3), below, shade=value)
