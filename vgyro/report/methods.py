@@ -41,6 +41,7 @@ ROUTINE = (
     "fitted from",
     "limits from the chi²",
     "one-sided ",
+    "of the error",
 )
 NOT_SIGNIFICANT = "not significant"
 NOT_SHOWN = "not shown to exist"
