@@ -24,6 +24,7 @@ SIMPLE = ("average", "median", "inverse_variance_arw")
 MOST_LOST = 1e-3
 AT_REST_KINDS = ("static", "thermal", "free")
 REST_FACTORS = (("if_sigma", "1σ"), ("if_bias_drift", "bias drift"))
+IN_SAMPLE = "_in_sample"
 STILL_FALLS = "the curve still falls"
 BAD_RULE = (
     f"A gyro is called bad where, at rest, its 1σ or its Allan deviation at {SHORTEST_TAU:g} s or longer is more than "
@@ -32,8 +33,8 @@ BAD_RULE = (
 )
 BEST_RULE = (
     "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording "
-    "at rest. DCC beats the simple baselines (average, median, fixed inverse variance) where the lower limit of "
-    "its factor is above the best of theirs; causal DCC only, because in-sample weights have seen what they weigh."
+    "at rest; in-sample weights are left out, because they have seen what they weigh. DCC beats the simple baselines "
+    "(average, median, fixed inverse variance) where the lower limit of its factor is above the best of theirs."
 )
 ARCH_RULE = "ARCH of the level is called drift where the detrended series does not reject at 5 %."
 
@@ -141,13 +142,17 @@ def _above(array: ArrayPart, words: str, limit: float, known: dict[str, tuple[fl
 
 
 def best_method(array: ArrayPart, metric: str, *, full_bandwidth: bool = False) -> Best | None:
-    """The method with the greatest improvement factor; full_bandwidth : of those that do not narrow the bandwidth."""
+    """The method, not in-sample, with the greatest improvement factor.
+
+    full_bandwidth : of those that do not narrow the bandwidth
+    """
     labels = _labels(array)
     limited = {(row["method"], row["definition"]) for row in array.methods() if np.isfinite(row["bandwidth_hz"])}
     found = [
         Best(labels[name], name[0], known[metric], array.axis, array.recording)
         for name, known in array.values().items()
-        if name in labels and metric in known and known[metric].known and not (full_bandwidth and name in limited)
+        if name in labels and metric in known and known[metric].known
+        if not name[0].endswith(IN_SAMPLE) and not (full_bandwidth and name in limited)
     ]
     return max(found, key=lambda best: best.factor.value, default=None)
 
