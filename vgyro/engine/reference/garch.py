@@ -107,10 +107,11 @@ def _ended_well(result: Any) -> bool:
 
 
 def _inside(parameters: np.ndarray) -> np.ndarray:
-    """Clip what the optimiser returned to α, β >= 0, α + β < 1."""
+    """Clip what the optimiser returned to α, β >= 0, α + β < 1; a β of rounding is 0."""
     omega = max(parameters[0], 1e-8)
     alpha = min(max(parameters[1], 0.0), PERSISTENCE_MAX)
-    return np.array([omega, alpha, min(max(parameters[2], 0.0), PERSISTENCE_MAX - alpha)])
+    beta = min(parameters[2], PERSISTENCE_MAX - alpha) if parameters[2] >= BETA_ZERO else 0.0
+    return np.array([omega, alpha, beta])
 
 
 def _value(e: np.ndarray, parameters: np.ndarray) -> float:
