@@ -66,7 +66,8 @@ def run(options: argparse.Namespace) -> int:
         record = {"manifest": str(target), "board": board.name, "recordings": recordings, "notes": notes}
         print(json.dumps(record, indent=1, ensure_ascii=False))
     else:
-        print(f"{target}: board {board.name} ({notes[0]}), {len(drafts)} recordings")
+        runs = "1 recording" if len(drafts) == 1 else f"{len(drafts)} recordings"
+        print(f"{target}: board {board.name} ({notes[0]}), {runs}")
         print("next: correct the kind of each recording in it, then vgyro check, then snakemake --cores 2")
     return 0
 
