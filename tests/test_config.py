@@ -5,7 +5,7 @@ import yaml
 from pydantic import BaseModel
 
 from vgyro.board import Board
-from vgyro.config import Analysis, Config, check_methods, merge, override_analysis, override_problems, parse_config
+from vgyro.config import Analysis, Config, merge, override_analysis, override_problems, parse_config
 from vgyro.dataset import Manifest
 from vgyro.describe import config_yaml, models_in, type_text
 from vgyro.validation import InvalidFile
@@ -78,10 +78,3 @@ def test_a_step_longer_than_the_window_is_refused():
         InvalidFile, match=r"config\.yaml:2: analysis\.volatility: step = 400 is longer than window = 360"
     ):
         parse_config("analysis:\n  volatility: {step: 400}\n")
-
-
-def test_an_unknown_method_is_named_with_the_nearest():
-    options = Config.model_validate({"analysis": {"fusion": {"methods": ["median", "avarage"]}}}).analysis.fusion
-    with pytest.raises(ValueError, match="unknown method 'avarage'; did you mean 'average'"):
-        check_methods(options, ["average", "median"])
-    check_methods(Config().analysis.fusion, [])

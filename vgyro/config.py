@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from vgyro import complaints
-from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
+from vgyro.validation import Problem, StrictModel, parse_model
 
 Definition = Literal["level", "demeaned", "difference", "residual"]
 Mode = Literal["in_sample", "causal"]
@@ -151,10 +151,3 @@ def override_problems(analysis: Analysis, override: Analysis | None, source: str
         found = complaints.of_errors(error.errors(include_url=False), merged, Analysis)
         return [Problem(source, 1, ".".join(["analysis", *map(str, path)]), message) for path, message in found]
     return []
-
-
-def check_methods(options: FusionOptions, known: list[str]) -> None:
-    """Refuse a method name that is not in the registry.  raises : ValueError"""
-    for name in options.methods if options.methods != "all" else ():
-        if name not in known:
-            raise ValueError(f"unknown method {name!r}{did_you_mean(name, known)}")

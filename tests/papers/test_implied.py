@@ -48,7 +48,8 @@ def test_jiang_static_design():
 
 @pytest.mark.parametrize(("q", "bandwidth"), [(0.0772, 1.0), (1.929, 5.0)])
 def test_jiang_process_noises_are_round_bandwidths(q, bandwidth):
-    assert forms.noise_for_bandwidth(bandwidth, q, 6) == pytest.approx(0.1083, abs=5e-5)
+    # At the noise density of 0.1083 deg/s/√Hz, six uncorrelated gyros.
+    assert design.bandwidth(6 / 0.1083**2, q, math.inf) == pytest.approx(bandwidth, rel=5e-4)
 
 
 def test_jiang_markov_is_the_random_walk():

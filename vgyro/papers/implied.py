@@ -26,11 +26,6 @@ def alike(arw: float, gyros: int, correlation: float = 0.0) -> np.ndarray:
     return arw**2 * ((1.0 - correlation) * np.eye(gyros) + correlation)
 
 
-def noise_for_bandwidth(bandwidth_hz: float, q: float, gyros: int) -> float:
-    """σ_n at which q gives this bandwidth, deg/s/√Hz: N gyros, uncorrelated (J eq. 19 solved for σ_n)."""
-    return math.sqrt(gyros * q) / (2.0 * math.pi * bandwidth_hz)
-
-
 def allan_minimum(white: float, walk: float) -> float:
     """Least value of √(N²/τ + K²τ/3), deg/s: √(2NK/√3).  white : N, deg/s/√Hz;  walk : K, deg/s/√s"""
     return math.sqrt(2.0 * white * walk / math.sqrt(3.0))
