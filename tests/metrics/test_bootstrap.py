@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from vgyro.metrics import allan_deviation, block_length, make_units, moments, read_curve, resample
+from vgyro.metrics.bootstrap import scale_limits
 
 
 def first_order(rho: float, samples: int, seed: int) -> np.ndarray:
@@ -68,3 +69,11 @@ def test_replicates_of_the_allan_deviation_have_its_spread():
     drawn = resample(make_units(rate, 20.0), 400, 1).adev_1s[:, 0]
     assert drawn.mean() == pytest.approx(read_curve(curve, 1.0)[0], rel=0.02)
     assert drawn.std() == pytest.approx(curve.deviation[0] / np.sqrt(2 * curve.edf[0]), rel=0.25)
+
+
+def test_limits_of_a_size_surround_the_size_that_blocks_lose():
+    # By hand: percentiles 0.75 and 0.85 about a median of 0.8, moved by 1/0.8 to the size of 1.
+    replicates = np.linspace(0.7, 0.9, 101)
+    low, high = scale_limits(1.0, replicates, 0.5)
+    assert (low, high) == pytest.approx((0.75 / 0.8, 0.85 / 0.8))
+    assert scale_limits(0.0, np.zeros(5), 0.95) == (0.0, 0.0)
