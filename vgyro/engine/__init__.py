@@ -10,9 +10,9 @@ from vgyro.errors import EngineError
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: an engine that is loaded by name must stand here too.
-    from vgyro.engine import reference  # noqa: F401
+    from vgyro.engine import native, reference  # noqa: F401
 
-ENGINES = ("reference",)
+ENGINES = ("native", "reference")
 
 
 def get(name: str) -> ModuleType:

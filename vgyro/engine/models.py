@@ -7,13 +7,30 @@ from dataclasses import dataclass
 import numpy as np
 
 CONVERGED = "converged"
-BOUNDARY = "boundary"
+ALPHA_ZERO = "boundary: α = 0"
+BETA_ZERO = "boundary: β = 0"
+PERSISTENCE_ONE = "boundary: α + β = 1"
+A_ZERO = "boundary: a = 0"
+B_ZERO = "boundary: b = 0"
+SUM_ONE = "boundary: a + b = 1"
+BOUNDARY_MARGIN = "boundary margin"
+OUTLIER_DOMINATED = "outlier-dominated"
 NO_VARIANCE = "no variance"
 TOO_SHORT = "too short"
-FAILED = "failed"
-BOUNDARY_MARGIN = "boundary margin"
 NOT_POSITIVE_DEFINITE = "not positive definite"
 ONE_GYRO = "one gyro"
+FAILED = "failed"
+
+GARCH_STATUSES = (
+    CONVERGED, ALPHA_ZERO, BETA_ZERO, PERSISTENCE_ONE, OUTLIER_DOMINATED, NO_VARIANCE, TOO_SHORT, FAILED,
+)  # fmt: skip
+"""What a fit of GARCH(1,1) may end as; a code of GarchWindows.status is a place in this tuple."""
+
+DCC_STATUSES = (
+    CONVERGED, A_ZERO, B_ZERO, SUM_ONE, BOUNDARY_MARGIN, OUTLIER_DOMINATED, NOT_POSITIVE_DEFINITE, ONE_GYRO, TOO_SHORT,
+    FAILED,
+)  # fmt: skip
+"""What a fit of DCC(1,1) may end as; a code of DccWindows.status is a place in this tuple."""
 
 PERSISTENCE_MAX = 1 - 1e-6
 """Largest α + β (and a + b) that a fit may return; a fit that reaches it is at the boundary."""
@@ -30,7 +47,8 @@ class GarchFit:
     stderr         : [N, 3] robust standard errors of (ω, α, β); NaN unless the status is `converged`
     log_likelihood : [N] Gaussian, with its constant: -½Σ(log 2π + log h + e²/h), r in deg/s
     variance       : [T, N] h_t, (deg/s)²
-    status         : [N] converged, boundary (α at 0, β at 0 or α + β at 1), no variance, too short, failed
+    status         : [N] one of GARCH_STATUSES. At a boundary, or where one sample dominates, the parameters are those
+                     of the greatest likelihood, without standard errors
     """
 
     omega: np.ndarray
@@ -52,9 +70,9 @@ class DccFit:
     log_likelihood : L_c of Liu et al. (2015), eq. 10: -½Σ(log|R| + z'R⁻¹z - z'z); no constant
     log_likelihood_ccc : the same with a = b = 0
     correlation    : [T, N, N] R_t
-    status         : converged; boundary (a or b at 0, a + b at 1); boundary margin (a GARCH margin is at its
-                     boundary, so there are no two-step standard errors); not positive definite (S is singular:
-                     correlation is the identity); one gyro; too short; failed (the optimiser: a = b = 0)
+    status         : one of DCC_STATUSES. boundary margin: a GARCH margin is at its boundary, so there are no two-step
+                     standard errors; outlier-dominated: a margin is; not positive definite: S is singular, correlation
+                     is the identity; failed: the optimiser did, a = b = 0
     """
 
     a: float
@@ -66,3 +84,38 @@ class DccFit:
     log_likelihood_ccc: float
     correlation: np.ndarray
     status: str
+
+
+@dataclass(frozen=True)
+class GarchWindows:
+    """GARCH(1,1) of K windows of N series: GarchFit without the paths.
+
+    omega (deg/s)², alpha, beta, log_likelihood [K, N]; stderr [K, N, 3]; status [K, N] uint8, places in GARCH_STATUSES
+    """
+
+    omega: np.ndarray
+    alpha: np.ndarray
+    beta: np.ndarray
+    stderr: np.ndarray
+    log_likelihood: np.ndarray
+    status: np.ndarray
+
+
+@dataclass(frozen=True)
+class DccWindows:
+    """DCC(1,1) of K windows of N series: DccFit without the paths, and the test of constant correlation.
+
+    a, b, log_likelihood, log_likelihood_ccc [K]; stderr, stderr_hessian [K, 2]; target [K, N, N]
+    statistic [K] : of Engle & Sheppard's test, NaN where there is none
+    status [K]    : uint8, places in DCC_STATUSES
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    stderr: np.ndarray
+    stderr_hessian: np.ndarray
+    target: np.ndarray
+    log_likelihood: np.ndarray
+    log_likelihood_ccc: np.ndarray
+    statistic: np.ndarray
+    status: np.ndarray

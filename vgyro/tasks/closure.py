@@ -20,6 +20,8 @@ def code_hash(module: str) -> str:
     for name in sorted(import_closure(module)):
         path = _source(name)
         digest.update(name.encode() + b"\0" + path.read_bytes())
+        for source in _c_sources(path):
+            digest.update(source.name.encode() + b"\0" + source.read_bytes())
         if path.name == "__init__.py":
             for data in sorted(entry for entry in path.parent.rglob("*") if _is_data(entry)):
                 digest.update(str(data.relative_to(ROOT)).encode() + b"\0" + data.read_bytes())
@@ -47,7 +49,10 @@ def import_closure(module: str) -> frozenset[str]:
 
 @cache
 def _imports(module: str, on_demand: bool) -> tuple[tuple[str, bool], ...]:
-    tree = ast.parse(_source(module).read_bytes())
+    path = _source(module)
+    if path.suffix == ".pyx":
+        return ()
+    tree = ast.parse(path.read_bytes())
     nodes = ast.walk(tree) if on_demand else iter(tree.body)
     found: set[tuple[str, bool]] = set()
     for node in nodes:
@@ -63,7 +68,18 @@ def _imports(module: str, on_demand: bool) -> tuple[tuple[str, bool], ...]:
 
 def _source(module: str) -> Path:
     path = ROOT.joinpath(*module.split(".")[1:])
-    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    if path.is_dir():
+        return path / "__init__.py"
+    compiled = path.with_suffix(".pyx")
+    return compiled if compiled.is_file() else path.with_suffix(".py")
+
+
+def _c_sources(path: Path) -> list[Path]:
+    """The C files of the extension _<domain>.pyx: c/<domain>*, and the headers that all domains share."""
+    if path.suffix != ".pyx":
+        return []
+    folder = path.parent / "c"
+    return sorted([*folder.glob(f"{path.stem[1:]}*"), folder / "vg.h", folder / "each_isa.h"])
 
 
 def _exists(module: str) -> bool:
@@ -71,4 +87,8 @@ def _exists(module: str) -> bool:
 
 
 def _is_data(path: Path) -> bool:
-    return path.is_file() and path.suffix not in {".py", ".pyc", ".so"} and "__pycache__" not in path.parts
+    return (
+        path.is_file()
+        and path.suffix not in {".py", ".pyc", ".so", ".pyx", ".c", ".h"}
+        and "__pycache__" not in path.parts
+    )

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vgyro.engine.independent import nnls_weights
-from vgyro.engine.models import BOUNDARY, CONVERGED
+from vgyro.engine.models import ALPHA_ZERO, CONVERGED
 from vgyro.storage.tables import read_columns
 from vgyro.tasks.common import Task
 from vgyro.tasks.crosscheck_rows import Row, compare
@@ -20,7 +20,7 @@ from vgyro.volatility.rolling import ModelWindow
 
 # Log-likelihood. At the boundary α = 0 leaves β without a meaning, and along β runs a ridge of nearly equal likelihood;
 # half a unit is far below the 1.92 that would tell two models apart at 5 %.
-GARCH_TOLERANCE = {CONVERGED: 0.01, BOUNDARY: 0.5}
+GARCH_TOLERANCE = {CONVERGED: 0.01, ALPHA_ZERO: 0.5}
 WEIGHT_TOLERANCE = 1e-8
 
 

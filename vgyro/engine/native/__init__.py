@@ -1,0 +1,40 @@
+"""The native engine: C kernels and their thin binding.
+
+garch   : GARCH(1,1), four series in lockstep, exact Newton, many starts
+dcc     : DCC(1,1) with two-step standard errors, and the test of constant correlation
+weights : constrained minimum-variance weights by an active set, and the path of the conditional covariance
+allan   : overlapping Allan deviation
+kalman  : filters and smoother of a scalar rate
+frames  : frames of a serial dump: synchronisation and checksums
+
+Each is a module, loaded at first use: `vgyro.engine.get("native").garch.fit_garch(...)`. The kernels are compiled for
+several instruction sets and chosen at run time; their results have the same bits on each, and for any number of threads.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from vgyro.errors import EngineError
+
+if TYPE_CHECKING:
+    # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
+    from vgyro.engine.native import allan, dcc, frames, garch, kalman, weights  # noqa: F401
+
+MODULES = ("garch", "dcc", "weights", "allan", "kalman", "frames")
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name not in MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        return import_module(f"{__name__}.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != f"{__name__}._{name}":
+            raise
+        raise EngineError(
+            f"the native engine is not built: {error.name} is missing",
+            remedy="run `make env`; it needs a C compiler (Debian: sudo apt-get install gcc libc6-dev python3-dev)",
+        ) from None
