@@ -7,6 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 LOCK := requirements/lock.txt
+NATIVE := $(wildcard vgyro/engine/native/*.pyx vgyro/engine/native/c/*)
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
@@ -17,7 +18,7 @@ help:
 
 env: $(READY)  ## make or update the environment in .venv
 
-$(READY): $(LOCK) requirements/uv.txt pyproject.toml workflow/setup.sh
+$(READY): $(LOCK) requirements/uv.txt pyproject.toml setup.py workflow/setup.sh $(NATIVE)
 	@PYTHON=$(PYTHON) sh workflow/setup.sh $(VENV) requirements/uv.txt $(LOCK)
 	@touch $@
 

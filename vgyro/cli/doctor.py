@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Look, print, return the exit code."""
-    findings = [*_python(), *_compiler(), *_packages(options.lock), *_programs(), *_folders(), *_disk()]
+    findings = [*_python(), *_compiler(), *_engine(), *_packages(options.lock), *_programs(), *_folders(), *_disk()]
     if options.json:
         print(json.dumps([asdict(finding) for finding in findings], indent=1, ensure_ascii=False))
     else:
@@ -78,6 +78,15 @@ def _compiler() -> Iterator[Finding]:
         yield Finding("ok", f"C compiler: {path}")
     else:
         yield Finding("missing", "C compiler (cc, gcc or clang)", "apt install gcc libc6-dev")
+
+
+def _engine() -> Iterator[Finding]:
+    try:
+        from vgyro.engine.native import _cpu
+    except ImportError:
+        yield Finding("missing", "the native engine is not built", RENEW)
+    else:
+        yield Finding("ok", f"native engine, for {_cpu.instruction_set()}")
 
 
 def _packages(lock: Path) -> Iterator[Finding]:
