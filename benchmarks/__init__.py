@@ -1,0 +1,1 @@
+"""Benchmarks: the native engine against the libraries, interleaved in one run. `python -m benchmarks --help`"""
