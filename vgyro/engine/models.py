@@ -119,3 +119,17 @@ class DccWindows:
     log_likelihood_ccc: np.ndarray
     statistic: np.ndarray
     status: np.ndarray
+
+
+@dataclass(frozen=True)
+class ConditionalWeights:
+    """Minimum-variance weights of E samples of K windows.
+
+    weights [K, E, N]; deviation [K, E, N] √h and sigma [K, E] √(w'Hw), deg/s
+    good [K, E] : False where H_t cannot be used (vgyro.engine.covariance.usable); the weights are equal there
+    """
+
+    weights: np.ndarray
+    deviation: np.ndarray
+    sigma: np.ndarray
+    good: np.ndarray

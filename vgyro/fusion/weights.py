@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.engine.covariance import usable
 from vgyro.errors import DataError, EngineError
 from vgyro.fusion.array import WeightKey
 
-# Smallest eigenvalue of the correlation matrix below which the minimum is not one point any more.
-SINGULAR = 1e-12
 
-
-def min_variance_weights(H: np.ndarray, engine: str = "reference") -> np.ndarray:
+def min_variance_weights(H: np.ndarray, engine: str = "native") -> np.ndarray:
     """Weights of the combination with the smallest variance: min w'Hw, Σw = 1, 0 ≤ w ≤ 1.
 
     H       : array [..., N, N], covariance of the N gyros in any unit; symmetric, positive definite
@@ -35,18 +33,6 @@ def min_variance_weights(H: np.ndarray, engine: str = "reference") -> np.ndarray
     _refuse_unusable(matrices, H.shape[:-2])
     matrices = (matrices + matrices.transpose(0, 2, 1)) / 2
     return engines.get(engine).weights.min_variance_weights(matrices).reshape(H.shape[:-1])
-
-
-def usable(H: np.ndarray) -> np.ndarray:
-    """Which matrices H [..., N, N] are finite, symmetric and positive definite: array [...] of bool."""
-    finite = np.isfinite(H).all(axis=(-1, -2))
-    safe = np.where(finite[..., None, None], H, 0.0)
-    variance = np.diagonal(safe, axis1=-2, axis2=-1)
-    positive = finite & (variance > 0).all(axis=-1)
-    scale = np.sqrt(np.where(positive[..., None], variance, 1.0))
-    correlation = np.where(positive[..., None, None], safe, 0.0) / (scale[..., :, None] * scale[..., None, :])
-    symmetric = (np.abs(correlation - np.swapaxes(correlation, -1, -2)) <= 1e-9).all(axis=(-1, -2))
-    return positive & symmetric & (np.linalg.eigvalsh(correlation)[..., 0] > SINGULAR)
 
 
 def _refuse_unusable(matrices: np.ndarray, leading: tuple[int, ...]) -> None:

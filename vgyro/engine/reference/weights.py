@@ -6,6 +6,9 @@ import warnings
 
 import numpy as np
 
+from vgyro.engine.covariance import conditional_covariance, usable
+from vgyro.engine.models import ConditionalWeights
+
 # One cvxpy problem holds this many small ones side by side, as the blocks of one quadratic form.
 BATCH = 2000
 # A weight below this share of the largest one is taken as zero when the support is read off the solver's answer.
@@ -33,6 +36,36 @@ def min_variance_weights(H: np.ndarray) -> np.ndarray:
         chosen = open_ones[start : start + BATCH]
         weights[chosen] = _polish(scaled[chosen], _solve(scaled[chosen]))
     return weights
+
+
+def conditional_weights(
+    r: np.ndarray,
+    inside: int,
+    omega: np.ndarray,
+    alpha: np.ndarray,
+    beta: np.ndarray,
+    a: np.ndarray,
+    b: np.ndarray,
+    target: np.ndarray,
+    begin: int,
+    end: int,
+) -> ConditionalWeights:
+    """Minimum-variance weights along the conditional covariance H_t of K windows, one window at a time.
+
+    Arguments and result as in vgyro.engine.native.weights. H_t comes from SciPy's filters, the weights from cvxpy.
+    """
+    count, _, n = r.shape
+    weights = np.full((count, end - begin, n), 1.0 / n)
+    deviation, sigma = np.empty_like(weights), np.empty(weights.shape[:2])
+    good = np.empty(weights.shape[:2], dtype=bool)
+    for k in range(count):
+        path = conditional_covariance(r[k], inside, omega[k], alpha[k], beta[k], float(a[k]), float(b[k]), target[k])
+        H = path[begin:end]
+        good[k] = usable(H)
+        weights[k, good[k]] = min_variance_weights(H[good[k]])
+        deviation[k] = np.sqrt(np.diagonal(H, axis1=1, axis2=2))
+        sigma[k] = np.sqrt(np.einsum("ti,tij,tj->t", weights[k], H, weights[k]))
+    return ConditionalWeights(weights, deviation, sigma, good)
 
 
 def _solve(H: np.ndarray) -> np.ndarray:

@@ -1,0 +1,332 @@
+/* Four problems in lockstep. Matrices are [n, n] of vectors, vectors [n]; n is a constant where speed matters. */
+
+#define SINGULAR 1e-12 /* as in vgyro.engine.covariance */
+#define NOISE (8 * 0x1p-53)
+#define GOOD_STEP 0x1p-27
+#define REFINEMENTS 20
+#define BLOCK_EXCHANGES 16
+#define EXCHANGES_EACH 64
+
+typedef uint64_t VG(bits) __attribute__((vector_size(32)));
+
+VG_INLINE v4 VG(absolute)(v4 x) { return (v4)((m4)x & INT64_MAX); }
+
+/* LDL' of A on the support; off it the matrix reads as the identity. Returns the lanes with positive pivots only.
+   shift : factor of the diagonal. */
+VG_INLINE m4 VG(factorise)(size_t n, const v4 *A, v4 shift, const m4 *support, v4 *L, v4 *inverse) {
+    const v4 one = v4_set(1.0);
+    v4 pivots[WEIGHTS_MAX], scaled[WEIGHTS_MAX];
+    m4 positive = ~(m4){0};
+#pragma GCC unroll 8
+    for (size_t j = 0; j < n; j++) {
+        v4 pivot = v4_select(support[j], A[j * n + j] * shift, one);
+#pragma GCC unroll 8
+        for (size_t k = 0; k < j; k++) {
+            scaled[k] = L[j * n + k] * pivots[k];
+            pivot -= L[j * n + k] * scaled[k];
+        }
+        positive &= pivot > 0.0;
+        pivots[j] = pivot;
+        inverse[j] = one / pivot;
+#pragma GCC unroll 8
+        for (size_t i = j + 1; i < n; i++) {
+            v4 sum = (v4)((m4)A[i * n + j] & support[i] & support[j]);
+#pragma GCC unroll 8
+            for (size_t k = 0; k < j; k++) sum -= L[i * n + k] * scaled[k];
+            L[i * n + j] = sum * inverse[j];
+        }
+    }
+    return positive;
+}
+
+/* x of LDL'x = b. */
+VG_INLINE void VG(substitute)(size_t n, const v4 *L, const v4 *inverse, const v4 *b, v4 *x) {
+#pragma GCC unroll 8
+    for (size_t i = 0; i < n; i++) {
+        v4 sum = b[i];
+#pragma GCC unroll 8
+        for (size_t k = 0; k < i; k++) sum -= L[i * n + k] * x[k];
+        x[i] = sum;
+    }
+#pragma GCC unroll 8
+    for (size_t i = n; i-- > 0;) {
+        v4 sum = x[i] * inverse[i];
+#pragma GCC unroll 8
+        for (size_t k = n; k-- > i + 1;) sum -= L[k * n + i] * x[k];
+        x[i] = sum;
+    }
+}
+
+/* residual = b - Ax, summed in twice the working precision; size = Σ|a x| of each row.
+   Products by Dekker (1971), sums by Knuth: Ogita, Rump & Oishi (2005), algorithm 5.3 (Dot2). */
+VG_INLINE void VG(residual)(size_t n, const v4 *A, const v4 *b, const v4 *x, v4 *residual, v4 *size) {
+    const v4 splitter = v4_set(0x1p27 + 1);
+    v4 high_x[WEIGHTS_MAX], low_x[WEIGHTS_MAX];
+#pragma GCC unroll 8
+    for (size_t j = 0; j < n; j++) {
+        v4 t = splitter * x[j];
+        high_x[j] = t - (t - x[j]);
+        low_x[j] = x[j] - high_x[j];
+    }
+#pragma GCC unroll 8
+    for (size_t i = 0; i < n; i++) {
+        v4 sum = b[i], rest = v4_set(0.0), absolute = v4_set(0.0);
+#pragma GCC unroll 8
+        for (size_t j = 0; j < n; j++) {
+            v4 t = splitter * A[i * n + j];
+            v4 high = t - (t - A[i * n + j]), low = A[i * n + j] - high;
+            v4 product = A[i * n + j] * x[j];
+            v4 error = low * low_x[j] - (((product - high * high_x[j]) - low * high_x[j]) - high * low_x[j]);
+            v4 next = sum - product, back = next - sum;
+            rest += ((sum - (next - back)) - (product + back)) - error;
+            sum = next;
+            absolute += VG(absolute)(product);
+        }
+        residual[i] = sum + rest;
+        size[i] = absolute;
+    }
+}
+
+/* x of Ax = b on the support, zero off it, to the last digits; and b - Ax of all rows, with its size.
+   Returns the lanes that could be solved. */
+VG_INLINE m4 VG(solve)(size_t n, const v4 *A, const v4 *b, const m4 *support, v4 *x, v4 *residual, v4 *size) {
+    v4 L[WEIGHTS_MAX * WEIGHTS_MAX], inverse[WEIGHTS_MAX], step[WEIGHTS_MAX], wanted[WEIGHTS_MAX];
+    m4 solved = VG(factorise)(n, A, v4_set(1.0), support, L, inverse);
+    for (size_t i = 0; i < n; i++) wanted[i] = (v4)((m4)b[i] & support[i]);
+    VG(substitute)(n, L, inverse, wanted, x);
+    m4 rough = solved;
+    int count = 0;
+    do {
+        VG(residual)(n, A, b, x, residual, size);
+        for (size_t i = 0; i < n; i++) wanted[i] = (v4)((m4)residual[i] & support[i]);
+        VG(substitute)(n, L, inverse, wanted, step);
+        v4 largest_step = v4_set(0.0), largest = v4_set(0.0);
+        for (size_t i = 0; i < n; i++) {
+            x[i] += (v4)((m4)step[i] & rough);
+            largest_step = v4_max(largest_step, VG(absolute)(step[i]));
+            largest = v4_max(largest, VG(absolute)(x[i]));
+        }
+        /* The next step would be smaller than this one as this one is than x. */
+        rough &= largest_step > GOOD_STEP * largest;
+    } while (m4_any(rough) && ++count < REFINEMENTS);
+    m4 all = support[0];
+    for (size_t i = 1; i < n; i++) all &= support[i];
+    if (m4_any(~all)) VG(residual)(n, A, b, x, residual, size);
+    return solved & ~rough;
+}
+
+/* A = SHS with powers of two in S, so that nothing is rounded and the diagonal lies in [1, 4). H: lower triangle. */
+VG_INLINE void VG(equilibrate)(size_t n, const v4 *H, v4 *A, v4 *scale) {
+    for (size_t i = 0; i < n; i++) {
+        VG(bits) exponent = (VG(bits))H[i * n + i] >> 52;
+        scale[i] = (v4)((2046 - ((exponent + 1023) >> 1)) << 52);
+    }
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j <= i; j++) A[i * n + j] = A[j * n + i] = H[i * n + j] * scale[i] * scale[j];
+}
+
+/* The exchanges of a principal pivoting step: out with negative x, in with rows whose inequality Ax >= b fails.
+   All at once at first; later only the last one, which always ends (Murty 1974). Returns the lanes with an exchange. */
+VG_INLINE m4 VG(exchange)(size_t n, int one_by_one, m4 open, const v4 *x, const v4 *residual, const v4 *size, m4 *support) {
+    m4 any = {0};
+    for (size_t i = n; i-- > 0;) {
+        m4 wrong = (support[i] & (x[i] < 0.0)) | (~support[i] & (residual[i] > NOISE * size[i]));
+        wrong &= open;
+        if (one_by_one) wrong &= ~any;
+        support[i] ^= wrong;
+        any |= wrong;
+    }
+    return any;
+}
+
+/* min w'Hw, Σw = 1, w >= 0: with Hx >= 1, x >= 0, x'(Hx - 1) = 0, w = x/Σx. Block principal pivoting from the full
+   support (Portugal, Júdice & Vicente 1994), so that a matrix has the same weights wherever it stands.
+   Returns the lanes where H is finite and positive definite; the others have equal weights. */
+VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, v4 *w) {
+    v4 A[WEIGHTS_MAX * WEIGHTS_MAX], L[WEIGHTS_MAX * WEIGHTS_MAX];
+    v4 scale[WEIGHTS_MAX], x[WEIGHTS_MAX], residual[WEIGHTS_MAX], size[WEIGHTS_MAX];
+    m4 support[WEIGHTS_MAX];
+    m4 good = ~(m4){0};
+    for (size_t i = 0; i < n; i++) {
+        support[i] = good;
+        good &= (H[i * n + i] > 0.0) & (H[i * n + i] < INFINITY);
+    }
+    VG(equilibrate)(n, H, A, scale);
+    good &= VG(factorise)(n, A, v4_set(1.0 - SINGULAR), support, L, x);
+    m4 open = good;
+    for (size_t count = 0; count < EXCHANGES_EACH * n && m4_any(open); count++) {
+        m4 solved = VG(solve)(n, A, scale, support, x, residual, size);
+        good &= solved | ~open;
+        open &= solved;
+        open = VG(exchange)(n, count >= BLOCK_EXCHANGES, open, x, residual, size, support);
+    }
+    good &= ~open;
+    v4 total = v4_set(0.0);
+    for (size_t i = 0; i < n; i++) {
+        w[i] = (v4)((m4)(x[i] * scale[i]) & support[i]);
+        total += w[i];
+    }
+    for (size_t i = 0; i < n; i++) w[i] = v4_select(good, w[i] / total, v4_set(1.0 / (double)n));
+    return good;
+}
+
+VG_INLINE void VG(min_variance_all)(size_t n, const double *H, size_t count, double *w) {
+    v4 matrices[WEIGHTS_MAX * WEIGHTS_MAX], weights[WEIGHTS_MAX];
+    for (size_t first = 0; first < count; first += VG_LANES) {
+        for (size_t lane = 0; lane < VG_LANES; lane++) {
+            const double *from = H + (first + lane < count ? first + lane : count - 1) * n * n;
+            for (size_t i = 0; i < n; i++)
+                for (size_t j = 0; j <= i; j++) matrices[i * n + j][lane] = from[i * n + j];
+        }
+        m4 good = VG(weigh)(n, matrices, weights);
+        for (size_t lane = 0; lane < VG_LANES && first + lane < count; lane++)
+            for (size_t i = 0; i < n; i++) w[(first + lane) * n + i] = good[lane] ? weights[i][lane] : NAN;
+    }
+}
+
+static void VG(min_variance_weights)(size_t n, const double *H, size_t count, double *w) {
+    if (n == 6)
+        VG(min_variance_all)(6, H, count, w);
+    else
+        VG(min_variance_all)(n, H, count, w);
+}
+
+/* What four windows carry from sample to sample: h, √h, and the lower triangle of Q. */
+typedef struct {
+    v4 omega[WEIGHTS_MAX], alpha[WEIGHTS_MAX], beta[WEIGHTS_MAX], a, b;
+    v4 h[WEIGHTS_MAX], deviation[WEIGHTS_MAX];
+    v4 constant[WEIGHTS_MAX * WEIGHTS_MAX], Q[WEIGHTS_MAX * WEIGHTS_MAX];
+    m4 leading; /* no sample yet with all its values */
+} VG(state);
+
+VG_INLINE v4 VG(root)(v4 x) {
+    double lanes[VG_LANES];
+    memcpy(lanes, &x, sizeof x);
+    for (int lane = 0; lane < VG_LANES; lane++) lanes[lane] = sqrt(lanes[lane]);
+    memcpy(&x, lanes, sizeof x);
+    return x;
+}
+
+VG_INLINE v4 VG(gather)(const double *const *from, size_t place) {
+    return (v4){from[0][place], from[1][place], from[2][place], from[3][place]};
+}
+
+/* e of sample t; `leading` loses the lanes where all of them are finite. */
+VG_INLINE void VG(take_sample)(size_t n, const double *const *r, size_t t, v4 *e, m4 *leading) {
+    m4 finite = ~(m4){0};
+    for (size_t i = 0; i < n; i++) {
+        e[i] = VG(gather)(r, t * n + i);
+        finite &= VG(absolute)(e[i]) < INFINITY;
+    }
+    *leading &= ~finite;
+}
+
+/* h of the first sample: ω + (α + β)·mean(e²) over the window; Q = S. With a = 0 the correlation is constant: b = 0. */
+VG_INLINE void VG(begin)(size_t n, const weights_windows *all, const double *const *r, const size_t *window, VG(state) *s) {
+    v4 e[WEIGHTS_MAX], square[WEIGHTS_MAX], count = v4_set(0.0);
+    const double *from[VG_LANES];
+    for (size_t i = 0; i < n; i++) square[i] = count;
+    s->leading = ~(m4){0};
+    for (size_t t = 0; t < all->inside; t++) {
+        VG(take_sample)(n, r, t, e, &s->leading);
+        for (size_t i = 0; i < n; i++) square[i] += (v4)((m4)(e[i] * e[i]) & ~s->leading);
+        count += (v4)((m4)v4_set(1.0) & ~s->leading);
+    }
+    s->leading = ~(m4){0};
+#define VG_LANES_OF(array, size) \
+    for (size_t lane = 0; lane < VG_LANES; lane++) from[lane] = all->array + window[lane] * (size)
+    VG_LANES_OF(omega, n);
+    for (size_t i = 0; i < n; i++) s->omega[i] = VG(gather)(from, i);
+    VG_LANES_OF(alpha, n);
+    for (size_t i = 0; i < n; i++) s->alpha[i] = VG(gather)(from, i);
+    VG_LANES_OF(beta, n);
+    for (size_t i = 0; i < n; i++) s->beta[i] = VG(gather)(from, i);
+    VG_LANES_OF(a, 1);
+    s->a = VG(gather)(from, 0);
+    VG_LANES_OF(b, 1);
+    s->b = (v4)((m4)VG(gather)(from, 0) & (s->a != 0.0));
+    VG_LANES_OF(target, n * n);
+#undef VG_LANES_OF
+    const v4 rest = 1.0 - s->a - s->b;
+    for (size_t i = 0; i < n; i++) {
+        s->h[i] = s->omega[i] + (s->alpha[i] + s->beta[i]) * (square[i] / count);
+        for (size_t j = 0; j <= i; j++) {
+            s->Q[i * n + j] = VG(gather)(from, i * n + j);
+            s->constant[i * n + j] = rest * s->Q[i * n + j];
+        }
+    }
+}
+
+/* h and Q of the next sample. */
+VG_INLINE void VG(advance)(size_t n, const v4 *e, VG(state) *s) {
+    v4 z[WEIGHTS_MAX];
+    const m4 leading = s->leading, moving = s->a != 0.0;
+    for (size_t i = 0; i < n; i++) {
+        z[i] = (v4)((m4)(e[i] / s->deviation[i]) & moving);
+        s->h[i] = v4_select(leading, s->h[i], s->omega[i] + s->alpha[i] * (e[i] * e[i]) + s->beta[i] * s->h[i]);
+    }
+    if (!m4_any(moving)) return;
+#pragma GCC unroll 8
+    for (size_t i = 0; i < n; i++) {
+        const v4 az = s->a * z[i];
+#pragma GCC unroll 8
+        for (size_t j = 0; j <= i; j++) {
+            const v4 next = s->constant[i * n + j] + az * z[j] + s->b * s->Q[i * n + j];
+            s->Q[i * n + j] = v4_select(leading, s->Q[i * n + j], next);
+        }
+    }
+}
+
+/* Weights, √h and √(w'Hw) of sample t, H = D R D. */
+VG_INLINE void VG(weigh_sample)(size_t n, const weights_windows *all, const VG(state) *s, size_t t, size_t first, size_t lanes) {
+    v4 H[WEIGHTS_MAX * WEIGHTS_MAX], w[WEIGHTS_MAX], factor[WEIGHTS_MAX], variance = v4_set(0.0);
+    for (size_t i = 0; i < n; i++) factor[i] = s->deviation[i] / VG(root)(s->Q[i * n + i]);
+    for (size_t i = 0; i < n; i++) {
+        for (size_t j = 0; j < i; j++) H[i * n + j] = s->Q[i * n + j] * factor[i] * factor[j];
+        H[i * n + i] = s->h[i];
+    }
+    const m4 good = VG(weigh)(n, H, w);
+    for (size_t i = 0; i < n; i++) {
+        v4 cross = v4_set(0.0);
+        for (size_t j = 0; j < i; j++) cross += H[i * n + j] * w[j];
+        variance += w[i] * (2.0 * cross + H[i * n + i] * w[i]);
+    }
+    const v4 sigma = VG(root)(variance);
+    for (size_t lane = 0; lane < lanes; lane++) {
+        const size_t row = (first + lane) * (all->end - all->begin) + t - all->begin;
+        for (size_t i = 0; i < n; i++) {
+            all->weights[row * n + i] = w[i][lane];
+            all->deviation[row * n + i] = s->deviation[i][lane];
+        }
+        all->sigma[row] = sigma[lane];
+        all->good[row] = good[lane] != 0;
+    }
+}
+
+VG_INLINE void VG(conditional_all)(size_t n, const weights_windows *all, size_t start, size_t stop) {
+    VG(state) s;
+    v4 e[WEIGHTS_MAX];
+    for (size_t first = start; first < stop; first += VG_LANES) {
+        const size_t lanes = stop - first < VG_LANES ? stop - first : VG_LANES;
+        const double *r[VG_LANES];
+        size_t window[VG_LANES];
+        for (size_t lane = 0; lane < VG_LANES; lane++) {
+            window[lane] = first + (lane < lanes ? lane : lanes - 1);
+            r[lane] = all->r + window[lane] * all->length * n;
+        }
+        VG(begin)(n, all, r, window, &s);
+        for (size_t t = 0; t < all->end; t++) {
+            for (size_t i = 0; i < n; i++) s.deviation[i] = VG(root)(s.h[i]);
+            if (t >= all->begin) VG(weigh_sample)(n, all, &s, t, first, lanes);
+            VG(take_sample)(n, r, t, e, &s.leading);
+            VG(advance)(n, e, &s);
+        }
+    }
+}
+
+static void VG(conditional_weights)(const weights_windows *all, size_t start, size_t stop) {
+    if (all->n == 6)
+        VG(conditional_all)(6, all, start, stop);
+    else
+        VG(conditional_all)(all->n, all, start, stop);
+}

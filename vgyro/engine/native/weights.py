@@ -1,0 +1,86 @@
+"""Minimum-variance weights in C: four matrices, or four windows, in lockstep."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vgyro.engine.models import ConditionalWeights
+from vgyro.engine.native import _weights, pool
+from vgyro.errors import EngineError
+
+PIECE = 1024
+"""Matrices that a thread takes at once; like WINDOWS, a multiple of four."""
+WINDOWS = 16
+
+
+def min_variance_weights(H: np.ndarray) -> np.ndarray:
+    """min w'Hw, Σw = 1, 0 ≤ w ≤ 1, for a stack of matrices.
+
+    H       : array [M, N, N], symmetric, N ≤ 32; vgyro.fusion.min_variance_weights refuses what cannot be used
+    returns : w [M, N]; NaN where the correlation has no eigenvalue above 1e-12 (vgyro.engine.covariance.usable)
+    raises  : EngineError for more gyros
+
+    With Hx ≥ 1, x ≥ 0, x'(Hx - 1) = 0 the weights are x/Σx. The support is found by block principal pivoting from the
+    full one (Portugal, Júdice & Vicente 1994; at last by Murty's single exchanges, 1974), so the weights of a matrix
+    depend on nothing else. H is scaled by powers of two to a diagonal in [1, 4), which rounds nothing. Each system
+    is solved by LDL' and refined with residuals in twice the working precision, so that w is exact to rounding as
+    long as the correlation is usable.
+    Liu et al. (2015), eq. 15-16; they name an active-set method.
+    """
+    H = np.ascontiguousarray(H, dtype=float)
+    _check_size(H.shape[2])
+    w = np.empty(H.shape[:2])
+    pool.run(lambda start, stop: _weights.min_variance_weights(H, w, start, stop), len(H), PIECE)
+    return w
+
+
+def conditional_weights(
+    r: np.ndarray,
+    inside: int,
+    omega: np.ndarray,
+    alpha: np.ndarray,
+    beta: np.ndarray,
+    a: np.ndarray,
+    b: np.ndarray,
+    target: np.ndarray,
+    begin: int,
+    end: int,
+) -> ConditionalWeights:
+    """Minimum-variance weights along the conditional covariance H_t = D_t R_t D_t of K windows.
+
+    r                  : [K, L, N] deg/s; the models were fitted to the first `inside` samples, and start from their
+                         mean(e²) and from Q_1 = S. Leading rows with a value that is not finite take the first H
+    omega, alpha, beta : [K, N], ω in (deg/s)²
+    a, b, target       : [K], [K], [K, N, N] S; a = 0 is a constant correlation
+    begin, end         : the samples to weigh, 0 ≤ begin ≤ end ≤ L; H_t uses r up to t - 1
+    returns            : ConditionalWeights; equal weights where H_t cannot be used
+    raises             : EngineError for more than 32 gyros
+    Liu et al. (2015), eq. 1-6 and 15-16.
+    """
+    r, omega, alpha, beta, a, b, target = (
+        np.ascontiguousarray(array, dtype=float) for array in (r, omega, alpha, beta, a, b, target)
+    )
+    count, length, n = r.shape
+    _check_size(n)
+    shape = (count, end - begin, n)
+    if not 0 <= begin <= end <= length or not 0 <= inside <= length:
+        raise EngineError(f"samples {begin} to {end} (window: {inside}) of a series of {length}")
+    weights, deviation, sigma = np.empty(shape), np.empty(shape), np.empty(shape[:2])
+    good = np.empty(shape[:2], dtype=bool)
+
+    def weigh(start: int, stop: int) -> None:
+        _weights.conditional_weights(
+            r, inside, omega, alpha, beta, a, b, target, begin, end, weights, deviation, sigma, good.view(np.uint8),
+            start, stop,
+        )  # fmt: skip
+
+    if weights.size:
+        pool.run(weigh, count, WINDOWS)
+    return ConditionalWeights(weights, deviation, sigma, good)
+
+
+def _check_size(n: int) -> None:
+    if not 1 <= n <= _weights.MAX_GYROS:
+        raise EngineError(
+            f"the native engine weighs 1 to {_weights.MAX_GYROS} gyros, not {n}", remedy="use engine: reference"
+        )
