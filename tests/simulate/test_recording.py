@@ -8,7 +8,7 @@ from scipy import stats
 
 from vgyro.board import Board
 from vgyro.errors import ConfigError
-from vgyro.simulate import Twin, dump_of, simulate_recording
+from vgyro.simulate import Dump, Twin, dump_of, lasting, simulate_pieces, simulate_recording
 from vgyro.simulate.recording import truth_table
 
 STILL = "kind: static, duration_s: 20"
@@ -148,6 +148,45 @@ def test_truth_names_a_fault_of_one_sample(quiet: Callable[..., Twin], dsp6: Boa
     table = truth_table(simulate_recording(twin, dsp6, "run"), dsp6)
     assert table["time"][table["fault_g1"]].tolist() == [5.0]
     assert {"reference", "bias_g6", "sd_g6", "temp_t6"} <= set(table)
+
+
+EVERY_FAULT = """[{kind: drift, gyro: g1, start: 2, size: 3}, {kind: burst, gyro: g2, start: 3, stop: 15, size: 2},
+  {kind: burst, gyro: g2, start: 8, stop: 9, size: 1}, {kind: stuck, gyro: g3, start: 4.99, stop: 11},
+  {kind: stuck, gyro: g5, start: 5, stop: 6}, {kind: dropout, gyro: g3, start: 10, stop: 10.5},
+  {kind: noise, gyro: g4, start: 1, size: 2}, {kind: scale, gyro: all, start: 12.03, stop: 13, size: 0.1}]"""
+
+
+@pytest.mark.parametrize("name", ["dsp6", "dsp6-text"])
+def test_the_pieces_change_nothing(quiet: Callable[..., Twin], board, monkeypatch, name: str) -> None:
+    gyros = "{all: {arw_deg_rt_h: 6, bias_instability_deg_h: 40, rrw_deg_h_rt_h: 200, garch: {alpha: 0.05, beta: 0.9}}}"
+    missing = "[[2, 3], [4.99, 6.2], [19, 30]]"
+    line = f"{{leading_bytes: 9, flips: 40, drops: 40, insertions: 40, missing: {missing}, cut_tail: 7}}"
+    more = "correlation: 0.2\ndcc: {a: 0.03, b: 0.94}\nsensor_pole_hz: 40\n"
+    twin, made = quiet(f"{STILL}, faults: {EVERY_FAULT}, line: {line}", gyros, more), board(name)
+    whole = simulate_recording(twin, made, "run")
+    expected, damage = dump_of(whole, made, twin)
+    monkeypatch.setattr("vgyro.simulate.recording.PIECE", 1000)  # 5 s
+    pieces = list(simulate_pieces(twin, made, "run"))
+    assert [piece.first for piece in pieces] == [0, 1000, 2000, 3000]
+    dump = Dump(twin, made, "run", lambda: iter(pieces))
+    assert b"".join(dump.feed(piece) for piece in pieces) == expected
+    assert dump.damage == damage
+    for name, values in truth_table(whole, made).items():
+        assert np.array_equal(np.concatenate([truth_table(piece, made)[name] for piece in pieces]), values), name
+
+
+def test_a_recording_at_rest_of_other_length(quiet: Callable[..., Twin], dsp6: Board) -> None:
+    faults = "[{kind: step, gyro: g1, start: 5, stop: 10, size: 9}, {kind: drift, gyro: g2, start: 15, size: 9}]"
+    line = "{flips: 8, drops: 4, insertions: 1, missing: [[2, 3]], cut_tail: 7}"
+    twin = lasting(quiet(f"{STILL}, faults: {faults}, line: {line}"), 0.1)
+    (recording,) = twin.recordings
+    assert recording.duration == 360
+    assert [(fault.start, fault.stop) for fault in recording.faults] == [(90, 180), (270, None)]
+    assert recording.line is not None
+    assert (recording.line.flips, recording.line.drops, recording.line.missing) == (144, 72, ((36, 54),))
+    assert simulate_recording(twin, dsp6, "run").time.size == 72000
+    moving = quiet("kind: constant, duration_s: 1, motion: {kind: constant, rate: 10}")
+    assert lasting(moving, 1.0) == moving
 
 
 def test_an_unknown_recording(twin: Twin, dsp6: Board) -> None:

@@ -14,6 +14,7 @@ examples:
   vgyro simulate demo                          writes raw/demo/
   vgyro simulate demo --out raw/demo2 --seed 2
   vgyro simulate my-twin.yaml --out raw/mine
+  vgyro simulate endurance --hours 1           an hour at rest instead of a day
 
 exit codes:
   0  written
@@ -28,6 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("twin", metavar="TWIN", help="name of a file in config/twins, or a path to one")
     parser.add_argument("--out", type=Path, help="folder to write; default: raw/<twin>")
     parser.add_argument("--seed", type=int, help="default: the seed that the twin names")
+    parser.add_argument(
+        "--hours",
+        type=positive,
+        help="length of the recordings at rest, their damage in proportion; default: the twin's",
+    )
     parser.add_argument("--force", action="store_true", help="overwrite a data set that is there")
 
 
@@ -40,9 +46,17 @@ def run(options: argparse.Namespace) -> int:
     folder = options.out or Path("raw") / path.stem
     if (folder / "dataset.yaml").exists() and not options.force:
         raise UsageError("there is a data set already", str(folder), "give another folder by --out, or --force")
-    simulate_dataset(path, folder, options.seed)
+    simulate_dataset(path, folder, options.seed, hours=options.hours)
     print(f"{folder}: simulated; next: snakemake --cores 2")
     return 0
+
+
+def positive(text: str) -> float:
+    """A number above 0.  raises : ArgumentTypeError"""
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
 
 
 def twin_path(name: str) -> Path:

@@ -1,14 +1,16 @@
 """Boards with known truth ("twins"), down to the bytes of a dump and its damage. See docs/twins.md."""
 
 from vgyro.simulate.closed_form import allan_minimum, expected_allan
+from vgyro.simulate.dump import Dump, dump_of
 from vgyro.simulate.encode import encode_frames
 from vgyro.simulate.line import Damage, damage
 from vgyro.simulate.manifest import dump_name, manifest_of, manifest_yaml, reference_name
-from vgyro.simulate.recording import Simulated, dump_of, simulate_recording
-from vgyro.simulate.twin import GyroTruth, Twin, check_against_board, parse_twin, truth_of
+from vgyro.simulate.recording import Simulated, simulate_pieces, simulate_recording
+from vgyro.simulate.twin import GyroTruth, Twin, check_against_board, lasting, parse_twin, truth_of
 
 __all__ = [
     "Damage",
+    "Dump",
     "GyroTruth",
     "Simulated",
     "Twin",
@@ -19,10 +21,12 @@ __all__ = [
     "dump_of",
     "encode_frames",
     "expected_allan",
+    "lasting",
     "manifest_of",
     "manifest_yaml",
     "parse_twin",
     "reference_name",
+    "simulate_pieces",
     "simulate_recording",
     "truth_of",
 ]

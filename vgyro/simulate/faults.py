@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.simulate.rows import row_at
 from vgyro.simulate.twin import EVERY_GYRO, Fault
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """A fault of one gyro over rows [first, last) of the recording; it lasts until `stop`, s."""
+
+    fault: Fault
+    gyro: int
+    first: int
+    last: int
+    stop: float
+    generator: np.random.Generator | None  # of a burst
+
+
+@dataclass(frozen=True)
 class Faults:
-    """[T, N] each but the last two: [N] lists of stretches [first, last) of samples.
+    """What the faults do to a piece of a recording, [T, N] each.
 
     added_bias, burst, burst_sd : deg/s;  noise_gain, gain : 1;  active : true while any fault acts
     """
@@ -23,57 +36,61 @@ class Faults:
     noise_gain: np.ndarray
     gain: np.ndarray
     active: np.ndarray
-    stuck: list[list[tuple[int, int]]]
-    dropout: list[list[tuple[int, int]]]
 
 
-def faults_of(
-    faults: Sequence[Fault], gyros: list[str], time: np.ndarray, generators: list[np.random.Generator]
-) -> Faults:
-    """Lay the faults of a recording over its samples.
+def stretches_of(
+    faults: Sequence[Fault],
+    gyros: list[str],
+    samples: int,
+    rate_hz: float,
+    generator: Callable[[str, int], np.random.Generator],
+) -> list[Stretch]:
+    """The faults of a recording of so many samples, gyro by gyro.
 
-    gyros : names, in the order of the columns;  time : [T], s;  generators : one a gyro, for the bursts
+    gyros : names, in the order of the columns;  generator : of the nth burst of a gyro
     """
-    shape = (time.size, len(gyros))
-    laid = Faults(
-        np.zeros(shape), np.zeros(shape), np.zeros(shape), np.ones(shape), np.ones(shape), np.zeros(shape, dtype=bool),
-        [[] for _ in gyros], [[] for _ in gyros],
-    )  # fmt: skip
+    end = (samples - 1) / rate_hz + 1.0 / rate_hz
+    laid: list[Stretch] = []
     for fault in faults:
-        stop = time[-1] + (time[1] - time[0]) if fault.stop is None else fault.stop
-        first, last = (int(index) for index in np.searchsorted(time, [fault.start - 1e-9, stop - 1e-9]))
+        stop = end if fault.stop is None else fault.stop
+        first, last = (min(row_at(moment - 1e-9, rate_hz), samples) for moment in (fault.start, stop))
         for index, name in enumerate(gyros):
             if fault.gyro in (name, EVERY_GYRO) and last > first:
-                laid.active[first:last, index] = True
-                _lay(
-                    laid,
-                    fault,
-                    slice(first, last),
-                    index,
-                    (time[first:last] - fault.start) / (stop - fault.start),
-                    generators,
-                )
+                bursts = sum(other.gyro == index and other.generator is not None for other in laid)
+                source = generator(name, bursts) if fault.kind == "burst" else None
+                laid.append(Stretch(fault, index, first, last, stop, source))
     return laid
 
 
-def _lay(
-    laid: Faults, fault: Fault, rows: slice, gyro: int, share: np.ndarray, generators: list[np.random.Generator]
-) -> None:
-    """share : [rows], part of the fault's time that has passed."""
+def faults_of(stretches: Sequence[Stretch], gyros: int, time: np.ndarray, first: int) -> Faults:
+    """Lay the faults over one piece; the pieces must come in order.  time : [T], s, of rows first, first + 1, …"""
+    shape = (time.size, gyros)
+    laid = Faults(
+        np.zeros(shape), np.zeros(shape), np.zeros(shape), np.ones(shape), np.ones(shape), np.zeros(shape, dtype=bool)
+    )
+    for stretch in stretches:
+        start, stop = max(stretch.first - first, 0), min(stretch.last - first, time.size)
+        if stop > start:
+            _lay(laid, stretch, slice(start, stop), time[start:stop])
+    return laid
+
+
+def _lay(laid: Faults, stretch: Stretch, rows: slice, time: np.ndarray) -> None:
+    fault, gyro = stretch.fault, stretch.gyro
     size = fault.size or 0.0
+    laid.active[rows, gyro] = True
     match fault.kind:
         case "drift":
-            laid.added_bias[rows, gyro] += size * share
+            laid.added_bias[rows, gyro] += size * ((time - fault.start) / (stretch.stop - fault.start))
         case "step":
             laid.added_bias[rows, gyro] += size
         case "burst":
-            laid.burst[rows, gyro] += size * generators[gyro].standard_normal(share.size)
+            assert stretch.generator is not None
+            laid.burst[rows, gyro] += size * stretch.generator.standard_normal(time.size)
             laid.burst_sd[rows, gyro] = np.hypot(laid.burst_sd[rows, gyro], size)
         case "noise":
             laid.noise_gain[rows, gyro] *= size
         case "scale":
             laid.gain[rows, gyro] *= 1.0 + size
-        case "stuck":
-            laid.stuck[gyro].append((rows.start, rows.stop))
-        case "dropout":
-            laid.dropout[gyro].append((rows.start, rows.stop))
+        case "stuck" | "dropout":
+            pass  # these act on the counts: see vgyro.simulate.adc

@@ -8,19 +8,29 @@ from vgyro.dataset import Plateau
 from vgyro.simulate.twin import ConstantRate, Motion, RandomRate, RateTable, Rest, Sinusoid
 
 
-def reference_rate(motion: Motion, time: np.ndarray, rate_hz: float, generator: np.random.Generator) -> np.ndarray:
-    """True rate, deg/s, at `time` [T], s, sampled evenly at rate_hz."""
-    match motion:
-        case Rest():
-            return np.zeros_like(time)
-        case ConstantRate():
-            return np.full_like(time, motion.rate)
-        case Sinusoid():
-            return motion.amplitude * np.sin(2.0 * np.pi * motion.frequency_hz * time + motion.phase_rad)
-        case RandomRate():
-            return _band_limited(motion, time.size, rate_hz, generator)
-        case RateTable():
-            return _table(motion, time)
+class ReferenceRate:
+    """True rate of a recording of so many samples, any stretch of it."""
+
+    def __init__(self, motion: Motion, samples: int, rate_hz: float, generator: np.random.Generator) -> None:
+        self._motion = motion
+        self._random = (
+            _band_limited(motion, samples, rate_hz, generator) if isinstance(motion, RandomRate) else np.empty(0)
+        )
+
+    def at(self, time: np.ndarray, first: int) -> np.ndarray:
+        """deg/s at `time` [T], s, which is that of rows first, first + 1, … of the recording."""
+        motion = self._motion
+        match motion:
+            case Rest():
+                return np.zeros_like(time)
+            case ConstantRate():
+                return np.full_like(time, motion.rate)
+            case Sinusoid():
+                return motion.amplitude * np.sin(2.0 * np.pi * motion.frequency_hz * time + motion.phase_rad)
+            case RandomRate():
+                return self._random[first : first + time.size]
+            case RateTable():
+                return _table(motion, time)
 
 
 def plateaus_of(motion: Motion) -> tuple[Plateau, ...]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,32 +12,33 @@ import numpy as np
 from vgyro.board import Board
 from vgyro.dataset import Plateau
 from vgyro.errors import DataError
-from vgyro.simulate.adc import channel_counts
-from vgyro.simulate.encode import encode
-from vgyro.simulate.faults import Faults, faults_of
-from vgyro.simulate.line import Damage, damage
-from vgyro.simulate.motion import plateaus_of, reference_rate
+from vgyro.simulate.adc import Converter
+from vgyro.simulate.faults import Faults, Stretch, faults_of, stretches_of
+from vgyro.simulate.motion import ReferenceRate, plateaus_of
 from vgyro.simulate.noise import (
+    ModulatedWhite,
+    Pole,
+    UnitRandomWalk,
     Volatility,
     White,
     correlation_matrix,
-    modulated_white,
     pole_of_motion,
     pole_of_noise,
     unit_flicker,
-    unit_random_walk,
 )
-from vgyro.simulate.twin import GyroTruth, Twin, TwinRecording, line_of, pole_of, temperature_of, truth_of
+from vgyro.simulate.rows import row_at
+from vgyro.simulate.twin import GyroTruth, Twin, TwinRecording, pole_of, temperature_of, truth_of
 from vgyro.units import arw_deg_s_rt_hz, deg_s, rrw_deg_s_rt_s
 
 MOTION, LINE, THERMOMETER, GYRO = range(4)
 WHITE, FLICKER, WALK, BURST = range(4)
+PIECE = 1 << 18  # samples of a piece, about
 TRUTH_HZ = 10.0
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """A recording and its truth.
+    """A recording, or a piece of it that begins at row `first`, and its truth.
 
     time      : [T], s                       reference : [T], deg/s, true rate about the axis that turns
     rates     : [T, N], deg/s, what each gyro would show if its scale were known: before ADC, `stuck` and `dropout`
@@ -46,6 +48,7 @@ class Simulated:
     white_sd  : [T, N], deg/s a sample, of the white noise before the sensor's pole, faults in
     faulty    : [T, N], true while a fault is active
     temperature : [T], °C;   plateaus : of a rate table, settling left out
+    stretches : faults of the whole recording
     """
 
     recording: str
@@ -61,143 +64,194 @@ class Simulated:
     faulty: np.ndarray
     temperature: np.ndarray
     plateaus: tuple[Plateau, ...] = field(default=())
+    stretches: tuple[Stretch, ...] = field(default=())
+    first: int = 0
 
 
 def simulate_recording(twin: Twin, board: Board, recording: str, seed: int | None = None) -> Simulated:
-    """Make one recording; the same numbers whether alone or with the others.
+    """Make one recording, whole; see simulate_pieces."""
+    pieces = list(simulate_pieces(twin, board, recording, seed))
+    joined: dict[str, Any] = {}
+    for name in (item.name for item in fields(Simulated)):
+        values = [getattr(piece, name) for piece in pieces]
+        if isinstance(values[0], np.ndarray):
+            joined[name] = np.concatenate(values)
+    counts = {name: np.concatenate([piece.counts[name] for piece in pieces]) for name in pieces[0].counts}
+    return replace(pieces[0], counts=counts, **joined)
+
+
+def simulate_pieces(twin: Twin, board: Board, recording: str, seed: int | None = None) -> Iterator[Simulated]:
+    """Make one recording, piece by piece; the same numbers whether alone or with the others.
 
     Every recording, gyro and kind of noise has a stream of its own, keyed by the names: adding a recording or a gyro
     changes no other.
     seed   : instead of the twin's
     raises : ConfigError if the twin has no such recording; DataError if it is too short to hold a sample
     """
+    maker = _Maker(twin, board, recording, seed)
+    first = 0
+    while first < maker.samples:
+        stop = maker.end_of_piece(first)
+        yield maker.piece(first, stop)
+        first = stop
+
+
+def rows_of(twin: Twin, board: Board, recording: str) -> tuple[int, float]:
+    """Samples of a recording, and how many there are a second.  raises : DataError if there are fewer than two"""
     spec = twin.recording(recording)
-    streams = _Streams(twin.seed if seed is None else seed, recording)
     rate_hz = spec.rate_hz or board.rate_hz
     samples = round(spec.duration * rate_hz)
     if samples < 2:
         raise DataError(f"recording {recording!r} of {spec.duration} s at {rate_hz} Hz holds {samples} samples")
-    names = [gyro.name for gyro in board.gyros]
-    truths = [truth_of(twin, spec, name) for name in names]
-    time = np.arange(samples) / rate_hz
-    reference = reference_rate(spec.motion, time, rate_hz, streams.of(MOTION))
-    faults = faults_of(spec.faults, names, time, [streams.of(GYRO, name, BURST) for name in names])
-    white = _white(twin, truths, names, samples, rate_hz, streams)
-    thermal = temperature_of(twin, spec)
-    temperature = thermal.start_c + thermal.rise_k * -np.expm1(-time / thermal.time_constant_s)
-    bias = _slow(twin, truths, names, samples, rate_hz, streams)
-    bias += np.outer(temperature - thermal.reference_c, [truth.temperature_coefficient for truth in truths])
-    bias += faults.added_bias
-    rates = _output(twin, board, spec, reference, white, faults, rate_hz) + bias
-    rates *= faults.gain
-    shown = temperature + thermal.noise_k * streams.of(THERMOMETER).standard_normal(samples)
-    counts = channel_counts(board, rates, [truth.scale_error for truth in truths], shown, faults)
-    white_sd = np.sqrt(rate_hz) * white.sd[white.block_index] * faults.noise_gain
-    return Simulated(
-        recording=recording,
-        rate_hz=rate_hz,
-        gyros=tuple(names),
-        time=time,
-        reference=reference,
-        rates=rates,
-        counts=counts,
-        bias=bias,
-        sd=white.sd,
-        white_sd=np.hypot(white_sd, faults.burst_sd),
-        faulty=faults.active,
-        temperature=temperature,
-        plateaus=plateaus_of(spec.motion),
-    )
-
-
-def dump_of(simulated: Simulated, board: Board, twin: Twin, seed: int | None = None) -> tuple[bytes, list[Damage]]:
-    """The bytes that reach the disk, and what the line did to them.
-
-    seed : instead of the twin's; the one given to simulate_recording
-    """
-    spec = twin.recording(simulated.recording)
-    line = line_of(twin, spec)
-    rows = np.arange(simulated.time.size)
-    kept = np.ones(rows.size, dtype=bool)
-    missing: list[tuple[int, int]] = []
-    for start, stop in line.missing:
-        gone = (simulated.time >= start) & (simulated.time < stop)
-        kept &= ~gone
-        if gone.any():
-            missing.append((int(rows[gone][0]), int(gone.sum())))
-    counts = {name: values[kept] for name, values in simulated.counts.items()}
-    encoded = encode(board, spec.counter_start + rows[kept], counts, simulated.time[kept])
-    generator = _Streams(twin.seed if seed is None else seed, simulated.recording).of(LINE)
-    data, done = damage(encoded.data, line, generator, encoded.starts, rows[kept])
-    for first, count in missing:
-        before = int(encoded.starts[np.searchsorted(rows[kept], first) - 1])
-        done.append(Damage("missing", before, first, f"{count} frames"))
-    return data, sorted(done, key=lambda item: item.offset)
+    return samples, rate_hz
 
 
 def truth_table(simulated: Simulated, board: Board, rate_hz: float = TRUTH_HZ) -> dict[str, Any]:
     """Columns of the `truth` schema, one row every 1/rate_hz s; a fault at any sample of a row counts."""
     step = max(round(simulated.rate_hz / rate_hz), 1)
-    starts = np.arange(0, simulated.time.size, step)
+    starts = np.arange(-simulated.first % step, simulated.time.size, step)
     columns: dict[str, Any] = {"time": simulated.time[starts], "reference": simulated.reference[starts]}
+    rows = starts + simulated.first
     for index, gyro in enumerate(simulated.gyros):
         columns[f"bias_{gyro}"] = simulated.bias[starts, index]
         columns[f"sd_{gyro}"] = simulated.white_sd[starts, index]
-        columns[f"fault_{gyro}"] = np.logical_or.reduceat(simulated.faulty[:, index], starts)
+        faulty = np.zeros(rows.size, dtype=bool)
+        for stretch in simulated.stretches:
+            faulty |= (stretch.gyro == index) & (rows < stretch.last) & (rows + step > stretch.first)
+        columns[f"fault_{gyro}"] = faulty
     for thermometer in board.temperatures:
         columns[f"temp_{thermometer.name}"] = simulated.temperature[starts]
     return columns
 
 
-class _Streams:
+class Streams:
     """Independent generators by name: SeedSequence with a spawn key made of the names' CRC-32 and the kind of noise."""
 
     def __init__(self, seed: int, recording: str) -> None:
         self._seed, self._recording = seed, zlib.crc32(recording.encode())
 
     def of(self, source: int, gyro: str = "", kind: int = 0) -> np.random.Generator:
+        """The generator of one source of chance."""
         key = (self._recording, source, zlib.crc32(gyro.encode()), kind)
         return np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=key))
 
 
-def _white(
-    twin: Twin, truths: list[GyroTruth], names: list[str], samples: int, rate_hz: float, streams: _Streams
-) -> White:
-    unit = np.column_stack([streams.of(GYRO, name, WHITE).standard_normal(samples) for name in names])
+class _Maker:
+    """All that goes on from one piece of a recording to the next."""
+
+    def __init__(self, twin: Twin, board: Board, recording: str, seed: int | None) -> None:
+        self.samples, self._rate_hz = rows_of(twin, board, recording)
+        self._twin, self._board, self._spec = twin, board, twin.recording(recording)
+        streams = Streams(twin.seed if seed is None else seed, recording)
+        self._names = [gyro.name for gyro in board.gyros]
+        truths = [truth_of(twin, self._spec, name) for name in self._names]
+        self._motion = ReferenceRate(self._spec.motion, self.samples, self._rate_hz, streams.of(MOTION))
+        self._stretches = stretches_of(
+            self._spec.faults,
+            self._names,
+            self.samples,
+            self._rate_hz,
+            lambda name, nth: streams.of(GYRO, name, BURST + nth),
+        )
+        self._white = [streams.of(GYRO, name, WHITE) for name in self._names]
+        self._modulated = ModulatedWhite(self._rate_hz, _volatility(twin, truths))
+        self._slow = _Slow(twin, truths, self._names, self.samples, self._rate_hz, streams)
+        self._coefficients = [truth.temperature_coefficient for truth in truths]
+        self._thermal, self._thermometer = temperature_of(twin, self._spec), streams.of(THERMOMETER)
+        self._output = _Output(twin, board, self._spec, self._rate_hz)
+        self._converter = Converter(board, [truth.scale_error for truth in truths], self._stretches)
+
+    def end_of_piece(self, first: int) -> int:
+        """Pieces are whole seconds."""
+        seconds = max(int(PIECE / self._rate_hz), 1)
+        second = round(first / self._rate_hz) + seconds
+        return min(row_at(second - 1e-9, self._rate_hz), self.samples)
+
+    def piece(self, first: int, stop: int) -> Simulated:
+        """Rows [first, stop), which must follow the piece before."""
+        samples, thermal = stop - first, self._thermal
+        time = np.arange(first, stop) / self._rate_hz
+        reference = self._motion.at(time, first)
+        faults = faults_of(self._stretches, len(self._names), time, first)
+        unit = np.column_stack([generator.standard_normal(samples) for generator in self._white])
+        white = self._modulated.next(unit)
+        temperature = thermal.start_c + thermal.rise_k * -np.expm1(-time / thermal.time_constant_s)
+        bias = self._slow.piece(first, stop)
+        bias += np.outer(temperature - thermal.reference_c, self._coefficients)
+        bias += faults.added_bias
+        rates = self._output.piece(reference, white, faults) + bias
+        rates *= faults.gain
+        shown = temperature + thermal.noise_k * self._thermometer.standard_normal(samples)
+        white_sd = np.sqrt(self._rate_hz) * white.sd[white.block_index] * faults.noise_gain
+        return Simulated(
+            recording=self._spec.name,
+            rate_hz=self._rate_hz,
+            gyros=tuple(self._names),
+            time=time,
+            reference=reference,
+            rates=rates,
+            counts=self._converter.counts(rates, shown, first),
+            bias=bias,
+            sd=white.sd,
+            white_sd=np.hypot(white_sd, faults.burst_sd),
+            faulty=faults.active,
+            temperature=temperature,
+            plateaus=plateaus_of(self._spec.motion),
+            stretches=tuple(self._stretches),
+            first=first,
+        )
+
+
+def _volatility(twin: Twin, truths: list[GyroTruth]) -> Volatility:
     alpha = np.array([truth.garch.alpha if truth.garch else 0.0 for truth in truths])
     beta = np.array([truth.garch.beta if truth.garch else 0.0 for truth in truths])
     density = np.array([arw_deg_s_rt_hz(truth.arw) for truth in truths])
-    target = correlation_matrix(twin.correlation, len(names))
+    target = correlation_matrix(twin.correlation, len(truths))
     a, b = (twin.dcc.a, twin.dcc.b) if twin.dcc else (0.0, 0.0)
-    return modulated_white(unit, rate_hz, Volatility(density**2 * (1.0 - alpha - beta), alpha, beta, a, b, target))
+    return Volatility(density**2 * (1.0 - alpha - beta), alpha, beta, a, b, target)
 
 
-def _slow(
-    twin: Twin, truths: list[GyroTruth], names: list[str], samples: int, rate_hz: float, streams: _Streams
-) -> np.ndarray:
-    """Constant bias, flicker and rate random walk, [T, N], deg/s; the last two correlated by `slow_correlation`."""
-    correlation = twin.correlation if twin.slow_correlation is None else twin.slow_correlation
-    mixing = np.linalg.cholesky(correlation_matrix(correlation, len(names))).T
-    b = np.array([deg_s(truth.bias_instability_deg_h) for truth in truths])
-    k = np.array([rrw_deg_s_rt_s(truth.rrw_deg_h_rt_h) for truth in truths])
-    slow = np.tile([truth.bias_deg_s for truth in truths], (samples, 1))
-    if b.any():
-        unit = np.column_stack([unit_flicker(samples, streams.of(GYRO, name, FLICKER)) for name in names])
-        slow += b * (unit @ mixing)
-    if k.any():
-        unit = np.column_stack([unit_random_walk(samples, rate_hz, streams.of(GYRO, name, WALK)) for name in names])
-        slow += k * (unit @ mixing)
-    return slow
+class _Slow:
+    """Constant bias, flicker and rate random walk, deg/s; the last two correlated by `slow_correlation`."""
+
+    def __init__(
+        self, twin: Twin, truths: list[GyroTruth], names: list[str], samples: int, rate_hz: float, streams: Streams
+    ) -> None:
+        correlation = twin.correlation if twin.slow_correlation is None else twin.slow_correlation
+        self._mixing = np.linalg.cholesky(correlation_matrix(correlation, len(names))).T
+        self._bias = [truth.bias_deg_s for truth in truths]
+        self._b = np.array([deg_s(truth.bias_instability_deg_h) for truth in truths])
+        self._k = np.array([rrw_deg_s_rt_s(truth.rrw_deg_h_rt_h) for truth in truths])
+        # Flicker has no end of memory: it is made whole, 4 bytes a sample and gyro.
+        self._flicker = [unit_flicker(samples, streams.of(GYRO, name, FLICKER)) for name in names if self._b.any()]
+        self._walks = [UnitRandomWalk(rate_hz, streams.of(GYRO, name, WALK)) for name in names if self._k.any()]
+
+    def piece(self, first: int, stop: int) -> np.ndarray:
+        """Rows [first, stop) of all gyros, [T, N]."""
+        slow = np.tile(self._bias, (stop - first, 1))
+        if self._flicker:
+            unit = np.column_stack([flicker[first:stop].astype(float) for flicker in self._flicker])
+            slow += self._b * (unit @ self._mixing)
+        if self._walks:
+            unit = np.column_stack([walk.next(stop - first) for walk in self._walks])
+            slow += self._k * (unit @ self._mixing)
+        return slow
 
 
-def _output(
-    twin: Twin, board: Board, spec: TwinRecording, reference: np.ndarray, white: White, faults: Faults, rate_hz: float
-) -> np.ndarray:
-    """Rate and white noise behind the sensor's pole, [T, N]; only gyros on the axis that turns see the rate."""
-    axis = spec.axis or board.axes[0]
-    turning = np.array([gyro.axis == axis for gyro in board.gyros], dtype=float)
-    noise = white.noise * faults.noise_gain + faults.burst
-    pole = pole_of(twin, spec)
-    if pole is not None:
-        reference, noise = pole_of_motion(reference, pole, rate_hz), pole_of_noise(noise, pole, rate_hz)
-    return np.outer(reference, turning) + noise
+class _Output:
+    """Rate and white noise behind the sensor's pole; only gyros on the axis that turns see the rate."""
+
+    def __init__(self, twin: Twin, board: Board, spec: TwinRecording, rate_hz: float) -> None:
+        axis = spec.axis or board.axes[0]
+        self._turning = np.array([gyro.axis == axis for gyro in board.gyros], dtype=float)
+        pole = pole_of(twin, spec)
+        self._poles: tuple[Pole, Pole] | None = None
+        if pole is not None:
+            self._poles = pole_of_motion(pole, rate_hz), pole_of_noise(pole, rate_hz)
+
+    def piece(self, reference: np.ndarray, white: White, faults: Faults) -> np.ndarray:
+        """The next piece, [T, N]."""
+        noise = white.noise * faults.noise_gain + faults.burst
+        if self._poles is not None:
+            reference, noise = self._poles[0].next(reference), self._poles[1].next(noise)
+        return np.outer(reference, self._turning) + noise

@@ -248,6 +248,34 @@ def parse_twin(text: str, source: str) -> Twin:
     return parse_model(text, Twin, source, {PARTIAL: True})
 
 
+def lasting(twin: Twin, hours: float) -> Twin:
+    """The twin with recordings at rest (static, thermal) of so many hours.
+
+    What happens in them keeps its place and its rate: faults and missing stretches are moved in proportion, and the
+    line hits as many bytes an hour as before.
+    """
+    recordings = []
+    for recording in twin.recordings:
+        if recording.kind not in {"static", "thermal"}:
+            recordings.append(recording)
+            continue
+        ratio = hours * 3600 / recording.duration
+        line = line_of(twin, recording)
+        hits = {name: round(getattr(line, name) * ratio) for name in ("flips", "drops", "insertions")}
+        missing = tuple((start * ratio, stop * ratio) for start, stop in line.missing)
+        faults = tuple(
+            fault.model_copy(update={"start": fault.start * ratio, "stop": fault.stop and fault.stop * ratio})
+            for fault in recording.faults
+        )
+        changes = {
+            "duration_s": hours * 3600,
+            "faults": faults,
+            "line": line.model_copy(update={**hits, "missing": missing}),
+        }
+        recordings.append(recording.model_copy(update=changes))
+    return twin.model_copy(update={"recordings": tuple(recordings)})
+
+
 def _check_merged(twin: Twin, recording: TwinRecording, gyro: str) -> None:
     """Each entry may be right, and what they say together wrong."""
     try:
