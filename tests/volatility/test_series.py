@@ -1,10 +1,15 @@
 """Block means and the definitions of r_t, on examples worked out by hand."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from vgyro.errors import ConfigError
 from vgyro.volatility import Window, block_means, detrended, residuals, window_residuals
+from vgyro.volatility.batches import fitted_batch, window_batch
+from vgyro.volatility.blocks import BlockMeans, RunFinder
+from vgyro.volatility.windowed import fitted_residuals
 
 
 def column(*values):
@@ -17,7 +22,6 @@ def test_blocks_by_hand():
     np.testing.assert_array_equal(series.values[:, 0], [0.5, 2.5, 4.5, 6.5, 8.5])
     np.testing.assert_array_equal(series.values[:, 1], [5, 25, 45, 65, 85])
     np.testing.assert_array_equal(series.time, [0, 0.5, 1, 1.5, 2])
-    np.testing.assert_array_equal(series.block_index, [0, 0, 1, 1, 2, 2, 3, 3, 4, 4])
     assert series.rate_hz == 2.0
 
 
@@ -31,7 +35,6 @@ def test_no_block_crosses_a_gap_or_leaves_rest():
     np.testing.assert_array_equal(series.values[:, 0], [0.5, 2.5, 5.5, 8.5, 10.5])
     np.testing.assert_array_equal(series.segment, [0, 0, 1, 1, 1])
     np.testing.assert_array_equal(series.stretch, [0, 0, 1, 2, 2])
-    np.testing.assert_array_equal(series.block_index, [0, 0, 1, 1, -1, 2, 2, -1, 3, 3, 4, 4])
     np.testing.assert_array_equal(series.time, [0, 2, 100, 103, 105])
 
 
@@ -42,7 +45,6 @@ def test_a_few_lost_samples_do_not_break_the_series():
     series = block_means(slots[:, None].astype(float), 1.0, 0.25, segment, time=slots.astype(float))
     np.testing.assert_array_equal(series.values[:, 0], [1.5, 17 / 3, 9.5, 16.5, 20.5 + 1])
     np.testing.assert_array_equal(series.stretch, [0, 0, 0, 1, 2])
-    np.testing.assert_array_equal(series.block_index, [0] * 4 + [1] * 3 + [2] * 4 + [3] * 4 + [-1] + [4] * 4)
     np.testing.assert_array_equal(series.time, [0, 4, 8, 15, 20])
 
 
@@ -59,7 +61,6 @@ def test_full_rate_and_rates_that_do_not_divide():
 def test_nothing_at_rest_gives_an_empty_series():
     series = block_means(np.zeros((10, 3)), 1.0, 1.0, rest=np.zeros(10, dtype=bool))
     assert series.values.shape == (0, 3)
-    assert np.all(series.block_index == -1)
     assert residuals(series.values, "level").shape == (0, 3)
 
 
@@ -130,3 +131,54 @@ def test_detrended():
     rest = detrended(line, 5)
     np.testing.assert_allclose(rest[2:-2], 0, atol=1e-12)
     np.testing.assert_allclose(rest[[0, -1], 0], [-1, 1])
+
+
+def lossy(rng, samples):
+    """Time, segment and rest of a recording that loses samples, restarts and moves now and then."""
+    slots = np.cumsum(1 + (rng.random(samples) < 0.1) * rng.integers(0, 6, samples))
+    lost = np.diff(slots, prepend=slots[:1]) > 1
+    segment = np.cumsum(lost | (rng.random(samples) < 0.02)).astype(np.int32)
+    rest = np.repeat(rng.random(samples // 7 + 1) < 0.8, 7)[:samples]
+    return slots / 10, segment, rest
+
+
+@pytest.mark.parametrize("length", [1, 4, 7])
+def test_blocks_do_not_depend_on_the_pieces(length):
+    # Expected: the whole recording in one piece. Whole numbers, so that every sum is exact.
+    rng = np.random.default_rng(length)
+    for _ in range(20):
+        rate = rng.integers(-50, 50, (120, 2)).astype(float)
+        time, segment, rest = lossy(rng, 120)
+        whole = block_means(rate, 10.0, "full" if length == 1 else 10 / length, segment, rest, time)
+        cuts = [0, *np.sort(rng.integers(0, 121, 4)), 120]
+        pieces = [slice(start, stop) for start, stop in pairwise(cuts)]
+        finder = RunFinder(10.0, length)
+        for piece in pieces:
+            finder.add(time[piece], segment[piece], rest[piece])
+        means = BlockMeans(finder.runs(), 2)
+        found = [means.add(list(rate[piece].T), time[piece], segment[piece]) for piece in pieces]
+        found.append(means.rest())
+        for name in ("values", "time", "segment", "stretch"):
+            joined = np.concatenate([getattr(part, name) for part in found])
+            np.testing.assert_array_equal(joined, getattr(whole, name))
+
+
+@pytest.mark.parametrize("definition", ["level", "demeaned", "difference", "residual"])
+def test_many_windows_at_once_are_the_windows_one_by_one(definition):
+    # Expected: window_residuals and fitted_residuals, bit for bit.
+    rng = np.random.default_rng(0)
+    values = rng.standard_normal((200, 3))
+    values[60:110, 1] = 0.3
+    starts, stretch_starts = np.array([20, 60, 65, 90, 152]), np.array([20, 20, 20, 90, 90])
+    found = window_batch(values, starts, 40, 8, definition, 7, stretch_starts)
+    for r, start, first in zip(found, starts, stretch_starts, strict=True):
+        np.testing.assert_array_equal(r, window_residuals(values, Window(start, start + 40), definition, 7, 8, first))
+    for begins in (starts == stretch_starts, starts > stretch_starts):
+        fitted = fitted_batch(values, starts[begins], 40, definition, 7, stretch_starts[begins])
+        for r, start, first in zip(fitted, starts[begins], stretch_starts[begins], strict=True):
+            expected = fitted_residuals(values, Window(start, start + 40), definition, 7, first)
+            np.testing.assert_array_equal(r, expected)
+    stuck = window_batch(values, starts[1:2], 40, 0, definition, 7, stretch_starts[1:2])
+    fitted = fitted_batch(values, starts[1:2], 40, definition, 7, stretch_starts[1:2])
+    assert not fitted[:, :, 1].any()
+    np.testing.assert_array_equal(fitted[:, :, [0, 2]], stuck[:, :, [0, 2]])

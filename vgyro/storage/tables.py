@@ -64,13 +64,22 @@ class TableWriter:
     """Write a table in batches: `with TableWriter(path, "frames", provenance) as writer: writer.append(columns)`.
 
     Every batch must have the columns and types of the first. Units come from the schema's declaration
-    (vgyro.storage.schemas); a column that the schema does not declare is an error.
+    (vgyro.storage.schemas); a column that the schema does not declare is an error. Each batch begins a row group.
+
+    extra       : JSON-able, added to the metadata
+    compression : of Parquet; "none" for a file that is read once
     """
 
     def __init__(
-        self, path: str | Path, schema: str, provenance: Provenance, extra: Mapping[str, Any] | None = None
+        self,
+        path: str | Path,
+        schema: str,
+        provenance: Provenance,
+        extra: Mapping[str, Any] | None = None,
+        compression: str = "zstd",
     ) -> None:
         self._path, self._schema, self._provenance, self._extra = Path(path), schema, provenance, dict(extra or {})
+        self._compression = compression
         self._writer: pq.ParquetWriter | None = None
 
     def __enter__(self) -> TableWriter:
@@ -82,9 +91,23 @@ class TableWriter:
         """Add rows: a mapping of column name to array or list, or an Arrow table."""
         table = columns if isinstance(columns, pa.Table) else pa.table(dict(columns))
         if self._writer is None:
-            described = table.schema.with_metadata({METADATA_KEY: self._metadata(table.column_names)})
-            self._writer = pq.ParquetWriter(self._beside, described, compression="zstd", version="2.6")
+            self._writer = self._open(table.schema)
         self._writer.write_table(table.cast(self._writer.schema), row_group_size=ROW_GROUP)
+
+    def _open(self, schema: pa.Schema) -> pq.ParquetWriter:
+        described = schema.with_metadata({METADATA_KEY: self._metadata(schema.names)})
+        # Numbers of a measurement hardly repeat: their bytes, not a dictionary, are what can be compressed.
+        numbers = [field.name for field in schema if pa.types.is_floating(field.type)]
+        split = numbers if self._compression != "none" else False
+        others = [field.name for field in schema if field.name not in numbers]
+        return pq.ParquetWriter(
+            self._beside,
+            described,
+            compression=self._compression,
+            version="2.6",
+            use_dictionary=others,
+            use_byte_stream_split=split,
+        )
 
     def _metadata(self, names: list[str]) -> bytes:
         record = {
@@ -133,6 +156,27 @@ def read_columns(path: str | Path, columns: list[str] | None = None) -> dict[str
     """Columns of a table as NumPy arrays; list columns come as object arrays of arrays."""
     table = pq.read_table(path, columns=columns)
     return {name: table.column(name).to_numpy() for name in table.column_names}
+
+
+def read_rows(path: str | Path, columns: list[str], start: int, stop: int) -> dict[str, np.ndarray]:
+    """Rows start to stop - 1 of some columns, as read_columns gives them; reads only the row groups that hold them.
+
+    Rows that the table does not have are left out.
+    """
+    file = pq.ParquetFile(path)
+    sizes = [file.metadata.row_group(index).num_rows for index in range(file.num_row_groups)]
+    edges = np.concatenate([[0], np.cumsum(sizes)])
+    groups = np.flatnonzero((edges[:-1] < stop) & (edges[1:] > start))
+    table = file.read_row_groups(groups.tolist(), columns=columns)
+    first = start - int(edges[groups[0]]) if len(groups) else 0
+    table = table.slice(first, max(0, stop - start))
+    return {name: table.column(name).to_numpy() for name in columns}
+
+
+def read_batches(path: str | Path, columns: list[str]) -> Iterator[dict[str, np.ndarray]]:
+    """A table's columns as NumPy arrays, ROW_GROUP rows at a time, in order."""
+    for batch in pq.ParquetFile(path).iter_batches(ROW_GROUP, columns=columns):
+        yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in columns}
 
 
 def read_frame(path: str | Path) -> pd.DataFrame:

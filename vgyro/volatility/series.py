@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.config import Definition
-from vgyro.errors import ConfigError
+from vgyro.volatility.batches import span_about
+from vgyro.volatility.blocks import PIECE, BlockMeans, RunFinder, block_length
 from vgyro.volatility.stretches import Window, stretches
 
 
@@ -17,7 +18,6 @@ class Series:
 
     values [M, N] deg/s; time [M] s, of the block's first sample; segment [M], of the rates;
     stretch [M]: number of the run without a missing block, within which windows lie;
-    block_index [T]: the block that each sample of the rates is in, -1: in none (motion, or too few left for a block);
     rate_hz : blocks a second
     """
 
@@ -25,7 +25,6 @@ class Series:
     time: np.ndarray
     segment: np.ndarray
     stretch: np.ndarray
-    block_index: np.ndarray
     rate_hz: float
 
 
@@ -49,63 +48,24 @@ def block_means(
     time     : [T] s; None: sample number / rate_hz
     returns  : Series; samples left over at the end of a stretch are in no block
     raises   : ConfigError if block_hz is above rate_hz
+    A recording too long to be held goes through vgyro.volatility.blocks piece by piece.
     """
     rate = np.asarray(rate, dtype=float)
     samples, n = rate.shape
-    if block_hz != "full" and float(block_hz) > rate_hz * (1 + 1e-6):
-        raise ConfigError(
-            f"a series of {block_hz} Hz cannot be made of rates of {rate_hz:g} Hz",
-            "analysis.volatility.rate_hz",
-            "lower it, or write full",
-        )
-    length = 1 if block_hz == "full" else max(1, round(rate_hz / float(block_hz)))
+    length = block_length(rate_hz, block_hz)
     segment = np.zeros(samples, dtype=np.int32) if segment is None else np.asarray(segment)
     use = np.ones(samples, dtype=bool) if rest is None else np.asarray(rest, dtype=bool)
     time = np.arange(samples) / rate_hz if time is None else np.asarray(time, dtype=float)
-    step = _slots_to_next(time, segment, use, rate_hz, length)
-    block_index = np.full(samples, -1, dtype=np.int64)
-    starts, numbers, values = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int32)], [np.empty((0, n))]
-    blocks, number = 0, 0
-    for run in stretches(np.cumsum(step == 0), use):
-        if not use[run.start]:
-            continue
-        block = np.concatenate([[0], np.cumsum(step[run.start + 1 : run.stop])]) // length
-        count = np.bincount(block)
-        # A block is complete when the run reaches its last slot, and good when at least half of its samples are there.
-        last_slot = int(step[run.start + 1 : run.stop].sum()) + 1
-        good = (2 * count >= length) & (length * (np.arange(len(count)) + 1) <= last_slot)
-        sums = np.column_stack([np.bincount(block, weights=rate[run.start : run.stop, i]) for i in range(n)])
-        values.append(sums[good] / count[good, None])
-        block_number = np.where(good, blocks + np.cumsum(good) - 1, -1)
-        block_index[run.start : run.stop] = block_number[block]
-        starts.append(run.start + np.searchsorted(block, np.flatnonzero(good)))
-        # A block that is not good ends a stretch.
-        numbers.append((number + np.cumsum(~good)[good]).astype(np.int32))
-        blocks += int(good.sum())
-        number += int((~good).sum()) + 1
-    start = np.concatenate(starts)
-    stretch = np.unique(np.concatenate(numbers), return_inverse=True)[1].astype(np.int32)
-    return Series(np.concatenate(values), time[start], segment[start], stretch, block_index, rate_hz / length)
-
-
-def _slots_to_next(time: np.ndarray, segment: np.ndarray, use: np.ndarray, rate_hz: float, length: int) -> np.ndarray:
-    """Sample periods from the sample before to each sample, [T]; 0 where a new run begins.
-
-    1 inside a segment. A gap of known duration, no longer than half a block, counts its lost samples; any other gap,
-    and a change between rest and motion, begins a new run.
-    """
-    step = np.ones(len(time), dtype=np.int64)
-    if len(time) == 0:
-        return step
-    border = np.concatenate([[False], segment[1:] != segment[:-1]])
-    periods = np.rint(np.diff(time, prepend=time[0]) * rate_hz).astype(np.int64)
-    # Without lost samples in between, the time that passed is not known: the board was restarted.
-    bridged = border & (periods >= 2) & (periods - 1 <= length // 2)
-    step[bridged] = periods[bridged]
-    step[border & ~bridged] = 0
-    step[1:][use[1:] != use[:-1]] = 0
-    step[0] = 0
-    return step
+    finder = RunFinder(rate_hz, length)
+    finder.add(time, segment, use)
+    means = BlockMeans(finder.runs(), n)
+    pieces = [slice(start, start + PIECE) for start in range(0, max(samples, 1), PIECE)]
+    parts = [means.add(list(rate[piece].T), time[piece], segment[piece]) for piece in pieces]
+    parts.append(means.rest())
+    values, when, where, stretch = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("values", "time", "segment", "stretch")
+    )
+    return Series(values, when, where, stretch, rate_hz / length)
 
 
 def residuals(
@@ -165,8 +125,6 @@ def detrended(r: np.ndarray, span: int) -> np.ndarray:
 
 def _running_mean(series: np.ndarray, inside: int, half: int) -> np.ndarray:
     """Mean over t - half to t + half of [T, N]: no further than sample `inside` - 1, and beyond that than t itself."""
-    index = np.arange(len(series))
-    low = np.maximum(index - half, 0)
-    high = np.where(index < inside, np.minimum(index + half, inside - 1), index)
+    low, high = span_about(len(series), inside, half)
     total = np.concatenate([np.zeros((1, series.shape[1])), np.cumsum(series, axis=0)])
     return (total[high + 1] - total[low]) / (high + 1 - low)[:, None]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -36,10 +38,49 @@ def longest_stretch(segment: np.ndarray) -> Window:
     return max(stretches(segment), key=lambda stretch: stretch.length, default=Window(0, 0))
 
 
+@dataclass(frozen=True)
+class RollingWindows:
+    """All full windows of a series: [k·step, k·step + length) from the start of each stretch, never across its border.
+
+    runs  : all stretches of the series, in order
+    start : [K] first sample of each window;  run : [K] number of the stretch it lies in
+    """
+
+    runs: tuple[Window, ...]
+    length: int
+    step: int
+    start: np.ndarray
+    run: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    @property
+    def stretch_start(self) -> np.ndarray:
+        """First sample of each window's stretch, [K]."""
+        return np.array([run.start for run in self.runs], dtype=np.int64)[self.run]
+
+    @property
+    def samples(self) -> int:
+        """Samples of the series."""
+        return self.runs[-1].stop if self.runs else 0
+
+    def window(self, number: int) -> Window:
+        """Samples of one window."""
+        start = int(self.start[number])
+        return Window(start, start + self.length)
+
+
+def rolling_windows(runs: Sequence[Window], length: int, step: int) -> RollingWindows:
+    """The rolling windows of a series whose stretches are `runs`."""
+    counts = np.array([max(0, (run.length - length) // step + 1) for run in runs], dtype=np.int64)
+    number = np.repeat(np.arange(len(runs)), counts)
+    within = np.arange(len(number)) - (np.cumsum(counts) - counts)[number]
+    first = np.array([run.start for run in runs], dtype=np.int64)
+    return RollingWindows(tuple(runs), length, step, first[number] + step * within, number)
+
+
 def windows(segment: np.ndarray, window: int, step: int) -> list[Window]:
-    """All full windows: [k·step, k·step + window) from the start of each segment, never across its border."""
-    return [
-        Window(start, start + window)
-        for stretch in stretches(segment)
-        for start in range(stretch.start, stretch.stop - window + 1, step)
-    ]
+    """The rolling windows of a series as a list; segment [M] numbers its stretches."""
+    plan = rolling_windows(stretches(segment), window, step)
+    return [plan.window(number) for number in range(len(plan))]

@@ -1,0 +1,85 @@
+"""The definitions of r_t for many windows at once: what vgyro.volatility.series says of one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vgyro.config import Definition
+
+
+def window_batch(
+    values: np.ndarray,
+    starts: np.ndarray,
+    length: int,
+    ahead: int,
+    definition: Definition,
+    span: int = 15,
+    stretch_starts: np.ndarray | None = None,
+) -> np.ndarray:
+    """r_t of K windows and of `ahead` samples after each: window_residuals, window by window.
+
+    values  : [m, N] deg/s, samples of the series
+    starts  : [K] first sample of each window in `values`;  length : of each window
+    ahead   : samples after each window; beyond the end of `values` the last sample is repeated
+    span    : samples of the first-pass rate estimate of `residual`
+    stretch_starts : [K] first sample of each window's stretch in `values`, for `difference`; None: starts
+    returns : [K, length + ahead, N] deg/s; `difference` is NaN in the first sample of a stretch
+    """
+    total = length + ahead
+    block = _cut(values, starts, total)
+    if definition == "level":
+        return block
+    if definition == "demeaned":
+        block -= block[:, :length].mean(axis=1, keepdims=True)
+        return block
+    if definition == "difference":
+        known = starts > (starts if stretch_starts is None else stretch_starts)
+        first = np.where(known[:, None], values[np.maximum(starts - 1, 0)], np.nan)
+        block[:, 1:] = block[:, 1:] - block[:, :-1]
+        block[:, 0] -= first
+        return block
+    low, high = span_about(total, length, span // 2)
+    median = _cut(np.median(values, axis=1), starts, total)
+    sums = np.concatenate([np.zeros((len(starts), 1)), np.cumsum(median, axis=1)], axis=1)
+    block -= ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
+    return block
+
+
+def fitted_batch(
+    values: np.ndarray,
+    starts: np.ndarray,
+    length: int,
+    definition: Definition,
+    span: int = 15,
+    stretch_starts: np.ndarray | None = None,
+) -> np.ndarray:
+    """r_t that the models of K windows are fitted to: fitted_residuals, window by window.
+
+    Arguments as in window_batch. With `difference`, all windows begin their stretch or none does.
+    returns : [K, length, N] deg/s, or one sample fewer where there is no first difference; zero throughout for a gyro
+              whose output does not change in the window
+    """
+    r = window_batch(values, starts, length, 0, definition, span, stretch_starts)
+    if definition == "difference" and len(r) and np.isnan(r[0, 0]).all():
+        r = r[:, 1:]
+    changes = np.cumsum(np.diff(values, axis=0, prepend=values[:1]) != 0, axis=0)
+    stuck = changes[starts + length - 1] == changes[starts]
+    if stuck.any():
+        r = np.where(stuck[:, None, :], 0.0, r)
+    return r
+
+
+def span_about(total: int, inside: int, half: int) -> tuple[np.ndarray, np.ndarray]:
+    """First and last sample [total] that a running mean at each sample takes.
+
+    t - half to t + half, no further than sample `inside` - 1, and beyond that no further than t itself.
+    """
+    index = np.arange(total)
+    high = np.where(index < inside, np.minimum(index + half, inside - 1), index)
+    return np.maximum(index - half, 0), high
+
+
+def _cut(values: np.ndarray, starts: np.ndarray, total: int) -> np.ndarray:
+    """Rows start to start + total - 1 for each start, [K, total, ...], a copy."""
+    rows = np.minimum(np.asarray(starts)[:, None] + np.arange(total), len(values) - 1)
+    return values[rows].astype(float, copy=False)
