@@ -1,4 +1,4 @@
-"""Kalman filters by filterpy, one sample at a time: slow, for checks."""
+"""Kalman filters by filterpy, one sample at a time, and recursions by scipy: slow, for checks."""
 
 from __future__ import annotations
 
@@ -6,8 +6,72 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vgyro.engine.finite import not_positive_definite, refuse_broken
+
 if TYPE_CHECKING:
     from filterpy.kalman import KalmanFilter
+
+
+def kalman_filter(
+    rate: np.ndarray,
+    transition: float,
+    process: float | np.ndarray,
+    noise: np.ndarray,
+    start: float,
+    variance: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The discrete Kalman filter of a scalar rate that N gyros measure: predict, then update, each sample.
+
+    rate       : array [T, N], deg/s
+    transition : F, from one sample to the next
+    process    : variance of the step to each sample, (deg/s)²: one number, or an array [T]
+    noise      : covariance of a sample, (deg/s)²: array [N, N], or one for each sample [T, N, N]
+    start, variance : mean and variance before the first sample
+    returns    : estimate [T], deg/s, and its variance [T], (deg/s)², after each update
+    raises     : EngineError that names the first sample that is not finite or whose R is not positive definite
+    """
+    rate, noise = np.asarray(rate, dtype=float), np.asarray(noise, dtype=float)
+    noises = np.broadcast_to(noise, (len(rate), *noise.shape[-2:]))
+    steps = np.broadcast_to(process, len(rate))
+    refuse_broken("rate", rate)
+    refuse_broken("noise covariance R", noises)
+    filter_ = _filter(rate.shape[1], transition, start)
+    filter_.P[:] = variance
+    estimate, spread = np.empty(len(rate)), np.empty(len(rate))
+    for index, sample in enumerate(rate):
+        filter_.predict(Q=steps[index])
+        try:
+            np.linalg.cholesky(noises[index])
+        except np.linalg.LinAlgError:
+            raise not_positive_definite(index) from None
+        filter_.update(sample[:, None], R=noises[index])
+        estimate[index], spread[index] = filter_.x[0, 0], filter_.P[0, 0]
+    return estimate, spread
+
+
+def rts_smoother(
+    estimate: np.ndarray, variance: np.ndarray, transition: float, process: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The Rauch-Tung-Striebel smoother of what kalman_filter returned.
+
+    estimate, variance : arrays [T], deg/s and (deg/s)², after each update
+    transition, process : those of the filter
+    returns : smoothed estimate [T], deg/s, and its variance [T], (deg/s)²
+    raises  : EngineError that names the first sample that is not finite
+    """
+    refuse_broken("estimate", estimate)
+    refuse_broken("variance", variance)
+    if len(estimate) == 0:
+        return np.empty(0), np.empty(0)
+    samples = len(estimate)
+    steps = np.broadcast_to(process, samples).reshape(-1, 1, 1)
+    smoothed, spread, _, _ = _filter(1, transition, 0.0).rts_smoother(
+        np.asarray(estimate, dtype=float)[:, None],
+        np.asarray(variance, dtype=float)[:, None, None],
+        np.broadcast_to(float(transition), (samples, 1, 1)),
+        steps,
+    )
+    return smoothed[:, 0], spread[:, 0, 0]
 
 
 def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, start: float) -> np.ndarray:
@@ -15,38 +79,46 @@ def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, 
 
     rate    : array [T, N], deg/s;  transition : F;  gain : K [N];  start : x before the first sample, deg/s
     returns : x after each sample [T], deg/s
+    raises  : EngineError that names the first sample that is not finite
     """
+    return _steady_state(rate, transition, np.broadcast_to(gain, rate.shape), start)
+
+
+def low_pass(signal: np.ndarray, keep: float, gain: float, start: float) -> np.ndarray:
+    """First-order recursion y_k = keep·y_{k-1} + gain·signal_k, y_{-1} = start: [T] → [T], by scipy.signal.lfilter.
+
+    raises : EngineError that names the first sample that is not finite
+    """
+    from scipy.signal import lfilter
+
+    refuse_broken("signal", signal)
+    filtered, _ = lfilter([gain], [1.0, -keep], np.asarray(signal, dtype=float), zi=[keep * start])
+    return filtered
+
+
+def settling_filter(signal: np.ndarray, keep: float, fading: float, start: float) -> np.ndarray:
+    """Random-walk filter with the analytic covariance of the time since its start: [T] → [T].
+
+    y_k = φ_k·y_{k-1} + (1 - φ_k)·signal_k, φ_k = keep·(1 - f_k)/(1 - f_{k+1}), f_k = fading·keep^(2k), y_{-1} = start.
+    keep : e^(-aT);  fading : c = (P0 - P∞)/(P0 + P∞)
+    raises : EngineError that names the first sample that is not finite
+    Xue et al. (2012), Measurement 45, 745-754. filterpy's steady-state steps, given the gain 1 - φ_k of each sample.
+    """
+    faded = 1.0 - fading * keep ** (2.0 * np.arange(len(signal) + 1))
+    return _steady_state(signal[:, None], 1.0, 1.0 - keep * faded[:-1, None] / faded[1:, None], start)
+
+
+def _steady_state(rate: np.ndarray, transition: float, gains: np.ndarray, start: float) -> np.ndarray:
+    """Steady-state steps with a gain [N] for each sample, gains [T, N]."""
+    refuse_broken("rate", rate)
     filter_ = _filter(rate.shape[1], transition, start)
-    filter_.K = gain[None, :]
     estimate = np.empty(len(rate))
-    for index, sample in enumerate(rate):
+    for index, sample in enumerate(np.asarray(rate, dtype=float)):
+        filter_.K = gains[index][None, :]
         filter_.predict_steadystate()
         filter_.update_steadystate(sample[:, None])
         estimate[index] = filter_.x[0, 0]
     return estimate
-
-
-def kalman_filter(
-    rate: np.ndarray, transition: float, process: float, noise: np.ndarray, start: float, variance: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """The discrete Kalman filter of a scalar rate that N gyros measure: predict, then update, each sample.
-
-    rate       : array [T, N], deg/s
-    transition : F, from one sample to the next;  process : variance of the step, (deg/s)²
-    noise      : array [N, N], covariance of a sample, (deg/s)²
-    start, variance : mean and variance before the first sample
-    returns    : estimate [T], deg/s, and its variance [T], (deg/s)², after each update
-    """
-    filter_ = _filter(rate.shape[1], transition, start)
-    filter_.P[:] = variance
-    filter_.Q[:] = process
-    filter_.R = noise
-    estimate, spread = np.empty(len(rate)), np.empty(len(rate))
-    for index, sample in enumerate(rate):
-        filter_.predict()
-        filter_.update(sample[:, None])
-        estimate[index], spread[index] = filter_.x[0, 0], filter_.P[0, 0]
-    return estimate, spread
 
 
 def _filter(gyros: int, transition: float, start: float) -> KalmanFilter:
