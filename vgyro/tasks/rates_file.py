@@ -9,41 +9,71 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from vgyro.errors import DataError
-from vgyro.storage.tables import read_columns, read_metadata
+from vgyro.storage.tables import read_batches, read_metadata
 
 
 @dataclass(frozen=True)
 class ArrayFile:
     """One array of one recording.
 
-    rate [T, N] deg/s; time, segment, at_rest [T]; reference [T] deg/s about this axis, None where it is not known
+    rate [T, N] deg/s, as stored (float32 or float64), each column contiguous; segment [T] int32; at_rest [T] bool.
+    Other columns are read from `path` each time they are asked for, so that a long recording need not hold them.
+    axis : of the array; the reference counts only if it is about this axis
     """
 
     rate: np.ndarray
-    time: np.ndarray
     segment: np.ndarray
     at_rest: np.ndarray
-    reference: np.ndarray | None
     rate_hz: float
+    path: Path
+    axis: str
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time of each sample [T], s. Read from the file."""
+        return read_column(self.path, "time")
+
+    @property
+    def reference(self) -> np.ndarray | None:
+        """True rate about this axis [T], deg/s; None where it is not known. Read from the file."""
+        known = "reference" in pq.read_schema(self.path).names
+        about_axis = known and read_metadata(self.path).get("reference_axis", self.axis) == self.axis
+        return read_column(self.path, "reference") if about_axis else None
 
     def rest_segment(self) -> np.ndarray:
         """Number [R] of the stretch, at rest and without a gap, of each sample at rest."""
-        breaks = np.diff(self.at_rest, prepend=False) | (np.diff(self.segment, prepend=self.segment[:1]) != 0)
-        return np.cumsum(breaks)[self.at_rest]
+        breaks = np.empty(len(self.at_rest), dtype=bool)
+        breaks[:1] = self.at_rest[:1]
+        breaks[1:] = (self.at_rest[1:] != self.at_rest[:-1]) | (self.segment[1:] != self.segment[:-1])
+        return np.cumsum(breaks, dtype=np.int32)[self.at_rest]
 
 
 def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
     """Columns of `gyros` from rates.parquet.  raises : DataError if the sample rate is not known"""
-    names = pq.read_schema(path).names
-    columns = ["time", "segment", "at_rest", *gyros]
     metadata = read_metadata(path)
-    about_axis = "reference" in names and metadata.get("reference_axis", axis) == axis
-    table = read_columns(path, [*columns, "reference"] if about_axis else columns)
     if metadata.get("rate_hz") is None:
         raise DataError("rates without a sample rate", str(path), "run the stage `convert` again")
-    samples = len(table["time"])
-    rate = np.column_stack([table[gyro] for gyro in gyros]) if samples else np.empty((0, len(gyros)))
-    reference = table["reference"] if about_axis else None
-    return ArrayFile(
-        rate, table["time"], table["segment"], table["at_rest"].astype(bool), reference, float(metadata["rate_hz"])
-    )
+    file = pq.ParquetFile(path)
+    samples = file.metadata.num_rows
+    kind = np.result_type(*(file.schema_arrow.field(gyro).type.to_pandas_dtype() for gyro in gyros))
+    rate = np.empty((len(gyros), samples), dtype=kind)
+    segment, at_rest = np.empty(samples, dtype=np.int32), np.empty(samples, dtype=bool)
+    first = 0
+    for batch in read_batches(path, ["segment", "at_rest", *gyros]):
+        rows = slice(first, first + len(batch["segment"]))
+        segment[rows], at_rest[rows] = batch["segment"], batch["at_rest"]
+        for column, gyro in zip(rate, gyros, strict=True):
+            column[rows] = batch[gyro]
+        first = rows.stop
+    return ArrayFile(rate.T, segment, at_rest, float(metadata["rate_hz"]), path, axis)
+
+
+def read_column(path: Path, name: str) -> np.ndarray:
+    """One column of numbers of any table [T], read in pieces; missing values are NaN."""
+    values = np.empty(pq.read_metadata(path).num_rows)
+    first = 0
+    for batch in read_batches(path, [name]):
+        last = first + len(batch[name])
+        values[first:last] = batch[name]
+        first = last
+    return values
