@@ -5,6 +5,8 @@
 #define GOOD_STEP 0x1p-27
 #define REFINEMENTS 20
 #define BLOCK_EXCHANGES 16
+/* Ax is uncertain by this share of the largest x after the last step of the refinement, and more. */
+#define NEAR 0x1p-18
 #define EXCHANGES_EACH 64
 
 typedef uint64_t VG(bits) __attribute__((vector_size(32)));
@@ -87,14 +89,14 @@ VG_INLINE void VG(residual)(size_t n, const v4 *A, const v4 *b, const v4 *x, v4 
     }
 }
 
-/* x of Ax = b on the support, zero off it, to the last digits; and b - Ax of all rows, with its size.
-   Returns the lanes that could be solved. */
-VG_INLINE m4 VG(solve)(size_t n, const v4 *A, const v4 *b, const m4 *support, v4 *x, v4 *residual, v4 *size) {
+/* x of Ax = b on the support, zero off it, to the last digits; and b - Ax of the rows off it, with its size.
+   near : x and residuals smaller than this may have the wrong sign. Returns the lanes that could be solved. */
+VG_INLINE m4 VG(solve)(size_t n, const v4 *A, const v4 *b, const m4 *support, v4 *x, v4 *residual, v4 *size, v4 *near) {
     v4 L[WEIGHTS_MAX * WEIGHTS_MAX], inverse[WEIGHTS_MAX], step[WEIGHTS_MAX], wanted[WEIGHTS_MAX];
-    m4 solved = VG(factorise)(n, A, v4_set(1.0), support, L, inverse);
+    const m4 solved = VG(factorise)(n, A, v4_set(1.0), support, L, inverse);
     for (size_t i = 0; i < n; i++) wanted[i] = (v4)((m4)b[i] & support[i]);
     VG(substitute)(n, L, inverse, wanted, x);
-    m4 rough = solved;
+    m4 rough = solved, unclear = {0};
     int count = 0;
     do {
         VG(residual)(n, A, b, x, residual, size);
@@ -108,10 +110,10 @@ VG_INLINE m4 VG(solve)(size_t n, const v4 *A, const v4 *b, const m4 *support, v4
         }
         /* The next step would be smaller than this one as this one is than x. */
         rough &= largest_step > GOOD_STEP * largest;
+        *near = NEAR * largest;
     } while (m4_any(rough) && ++count < REFINEMENTS);
-    m4 all = support[0];
-    for (size_t i = 1; i < n; i++) all &= support[i];
-    if (m4_any(~all)) VG(residual)(n, A, b, x, residual, size);
+    for (size_t i = 0; i < n; i++) unclear |= ~support[i] & (VG(absolute)(residual[i]) <= *near);
+    if (m4_any(unclear)) VG(residual)(n, A, b, x, residual, size);
     return solved & ~rough;
 }
 
@@ -126,41 +128,55 @@ VG_INLINE void VG(equilibrate)(size_t n, const v4 *H, v4 *A, v4 *scale) {
 }
 
 /* The exchanges of a principal pivoting step: out with negative x, in with rows whose inequality Ax >= b fails.
-   All at once at first; later only the last one, which always ends (Murty 1974). Returns the lanes with an exchange. */
-VG_INLINE m4 VG(exchange)(size_t n, int one_by_one, m4 open, const v4 *x, const v4 *residual, const v4 *size, m4 *support) {
+   All at once at first; in the lanes `one_by_one` only the last one, which always ends (Murty 1974).
+   Returns the lanes with an exchange. */
+VG_INLINE m4 VG(exchange)(size_t n, m4 open, m4 one_by_one, const v4 *x, const v4 *residual, const v4 *size, m4 *support) {
     m4 any = {0};
     for (size_t i = n; i-- > 0;) {
         m4 wrong = (support[i] & (x[i] < 0.0)) | (~support[i] & (residual[i] > NOISE * size[i]));
-        wrong &= open;
-        if (one_by_one) wrong &= ~any;
+        wrong &= open & ~(any & one_by_one);
         support[i] ^= wrong;
         any |= wrong;
     }
     return any;
 }
 
+/* The lanes whose support is right beyond doubt: any way to it would have ended there. */
+VG_INLINE m4 VG(certain)(size_t n, const v4 *x, const v4 *residual, v4 near, const m4 *support) {
+    m4 found = ~(m4){0};
+    for (size_t i = 0; i < n; i++) found &= (support[i] & (x[i] > near)) | (~support[i] & (residual[i] < -near));
+    return found;
+}
+
 /* min w'Hw, Σw = 1, w >= 0: with Hx >= 1, x >= 0, x'(Hx - 1) = 0, w = x/Σx. Block principal pivoting from the full
-   support (Portugal, Júdice & Vicente 1994), so that a matrix has the same weights wherever it stands.
+   support (Portugal, Júdice & Vicente 1994), unless the given one proves right beyond doubt: so a matrix has the same
+   weights whatever was before it.
+   H : lower triangle;  support : a guess, then that of the weights
    Returns the lanes where H is finite and positive definite; the others have equal weights. */
-VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, v4 *w) {
-    v4 A[WEIGHTS_MAX * WEIGHTS_MAX], L[WEIGHTS_MAX * WEIGHTS_MAX];
+VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, m4 *support, v4 *w) {
+    v4 A[WEIGHTS_MAX * WEIGHTS_MAX], L[WEIGHTS_MAX * WEIGHTS_MAX], near;
     v4 scale[WEIGHTS_MAX], x[WEIGHTS_MAX], residual[WEIGHTS_MAX], size[WEIGHTS_MAX];
-    m4 support[WEIGHTS_MAX];
-    m4 good = ~(m4){0};
+    m4 full[WEIGHTS_MAX], good = ~(m4){0}, guess = {0}, exchanges = {0};
     for (size_t i = 0; i < n; i++) {
-        support[i] = good;
+        full[i] = ~(m4){0};
+        guess |= ~support[i];
         good &= (H[i * n + i] > 0.0) & (H[i * n + i] < INFINITY);
     }
     VG(equilibrate)(n, H, A, scale);
-    good &= VG(factorise)(n, A, v4_set(1.0 - SINGULAR), support, L, x);
+    good &= VG(factorise)(n, A, v4_set(1.0 - SINGULAR), full, L, x);
     m4 open = good;
-    for (size_t count = 0; count < EXCHANGES_EACH * n && m4_any(open); count++) {
-        m4 solved = VG(solve)(n, A, scale, support, x, residual, size);
-        good &= solved | ~open;
-        open &= solved;
-        open = VG(exchange)(n, count >= BLOCK_EXCHANGES, open, x, residual, size, support);
+    while (m4_any(open)) {
+        const m4 solved = VG(solve)(n, A, scale, support, x, residual, size, &near);
+        const m4 again = open & guess & ~(solved & VG(certain)(n, x, residual, near, support));
+        const m4 searching = open & ~guess;
+        good &= solved | ~searching;
+        const m4 changed = VG(exchange)(n, searching & solved, exchanges >= BLOCK_EXCHANGES, x, residual, size, support);
+        for (size_t i = 0; i < n; i++) support[i] |= again;
+        guess = (m4){0};
+        exchanges -= changed;
+        good &= exchanges < EXCHANGES_EACH * (int64_t)n;
+        open = (again | changed) & good;
     }
-    good &= ~open;
     v4 total = v4_set(0.0);
     for (size_t i = 0; i < n; i++) {
         w[i] = (v4)((m4)(x[i] * scale[i]) & support[i]);
@@ -172,13 +188,15 @@ VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, v4 *w) {
 
 VG_INLINE void VG(min_variance_all)(size_t n, const double *H, size_t count, double *w) {
     v4 matrices[WEIGHTS_MAX * WEIGHTS_MAX], weights[WEIGHTS_MAX];
+    m4 support[WEIGHTS_MAX];
+    for (size_t i = 0; i < n; i++) support[i] = ~(m4){0};
     for (size_t first = 0; first < count; first += VG_LANES) {
         for (size_t lane = 0; lane < VG_LANES; lane++) {
             const double *from = H + (first + lane < count ? first + lane : count - 1) * n * n;
             for (size_t i = 0; i < n; i++)
                 for (size_t j = 0; j <= i; j++) matrices[i * n + j][lane] = from[i * n + j];
         }
-        m4 good = VG(weigh)(n, matrices, weights);
+        m4 good = VG(weigh)(n, matrices, support, weights);
         for (size_t lane = 0; lane < VG_LANES && first + lane < count; lane++)
             for (size_t i = 0; i < n; i++) w[(first + lane) * n + i] = good[lane] ? weights[i][lane] : NAN;
     }
@@ -196,7 +214,8 @@ typedef struct {
     v4 omega[WEIGHTS_MAX], alpha[WEIGHTS_MAX], beta[WEIGHTS_MAX], a, b;
     v4 h[WEIGHTS_MAX], deviation[WEIGHTS_MAX];
     v4 constant[WEIGHTS_MAX * WEIGHTS_MAX], Q[WEIGHTS_MAX * WEIGHTS_MAX];
-    m4 leading; /* no sample yet with all its values */
+    m4 support[WEIGHTS_MAX]; /* of the weights before */
+    m4 leading;              /* no sample yet with all its values */
 } VG(state);
 
 VG_INLINE v4 VG(root)(v4 x) {
@@ -247,6 +266,7 @@ VG_INLINE void VG(begin)(size_t n, const weights_windows *all, const double *con
     s->b = (v4)((m4)VG(gather)(from, 0) & (s->a != 0.0));
     VG_LANES_OF(target, n * n);
 #undef VG_LANES_OF
+    for (size_t i = 0; i < n; i++) s->support[i] = ~(m4){0};
     const v4 rest = 1.0 - s->a - s->b;
     for (size_t i = 0; i < n; i++) {
         s->h[i] = s->omega[i] + (s->alpha[i] + s->beta[i]) * (square[i] / count);
@@ -278,14 +298,14 @@ VG_INLINE void VG(advance)(size_t n, const v4 *e, VG(state) *s) {
 }
 
 /* Weights, √h and √(w'Hw) of sample t, H = D R D. */
-VG_INLINE void VG(weigh_sample)(size_t n, const weights_windows *all, const VG(state) *s, size_t t, size_t first, size_t lanes) {
+VG_INLINE void VG(weigh_sample)(size_t n, const weights_windows *all, VG(state) *s, size_t t, size_t first, size_t lanes) {
     v4 H[WEIGHTS_MAX * WEIGHTS_MAX], w[WEIGHTS_MAX], factor[WEIGHTS_MAX], variance = v4_set(0.0);
     for (size_t i = 0; i < n; i++) factor[i] = s->deviation[i] / VG(root)(s->Q[i * n + i]);
     for (size_t i = 0; i < n; i++) {
         for (size_t j = 0; j < i; j++) H[i * n + j] = s->Q[i * n + j] * factor[i] * factor[j];
         H[i * n + i] = s->h[i];
     }
-    const m4 good = VG(weigh)(n, H, w);
+    const m4 good = VG(weigh)(n, H, s->support, w);
     for (size_t i = 0; i < n; i++) {
         v4 cross = v4_set(0.0);
         for (size_t j = 0; j < i; j++) cross += H[i * n + j] * w[j];
