@@ -5,7 +5,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from vgyro.storage.tables import Provenance, TableWriter, read_batches, read_columns, read_rows
+from vgyro.storage.tables import Provenance, RowStream, TableWriter, read_columns, read_rows, row_groups, words
 
 GAIN = np.arange(25) / 8
 STATUS = np.array(["ok", "too short"], dtype=object)[np.arange(25) % 3 // 2]
@@ -30,12 +30,28 @@ def test_rows_are_those_of_the_whole_table(table, start, stop):
     np.testing.assert_array_equal(rows["note"], STATUS[start:stop])
 
 
-def test_batches_are_the_whole_table_in_order(table):
+def test_row_groups_and_streams_are_the_whole_table_in_order(table):
     whole = read_columns(table)
     np.testing.assert_array_equal(whole["note"], STATUS)
-    batches = list(read_batches(table, ["dc_gain", "note"]))
-    np.testing.assert_array_equal(np.concatenate([batch["dc_gain"] for batch in batches]), GAIN)
-    np.testing.assert_array_equal(np.concatenate([batch["note"] for batch in batches]), STATUS)
+    parts = [part.column("dc_gain").to_numpy() for part in row_groups(table, ["dc_gain"])]
+    assert [len(part) for part in parts] == [10, 10, 5]
+    np.testing.assert_array_equal(np.concatenate(parts), GAIN)
+    assert [part.num_rows for part in row_groups(table, first=1, every=2)] == [10]
+    stream = RowStream(row_groups(table))
+    taken = [stream.take(count) for count in (3, 0, 12, 50, 4)]
+    assert [part.num_rows for part in taken] == [3, 0, 12, 10, 0]
+    np.testing.assert_array_equal(pa.concat_tables(taken).column("dc_gain").to_numpy(), GAIN)
+    with pytest.raises(ValueError, match="no table"):
+        RowStream([]).take(1)
+
+
+def test_words_hold_only_what_occurs():
+    column = words(np.array([3, 1, 3, 3]), ["ok", "no model yet", "failed", "alone"])
+    assert column.to_pylist() == ["alone", "no model yet", "alone", "alone"]
+    assert column.dictionary.to_pylist() == ["alone", "no model yet"]
+    twice = words(np.array([0, 2]), ["ok", "x", "ok"])
+    assert twice.dictionary.to_pylist() == ["ok"]
+    assert words(np.empty(0, dtype=np.uint8), ["ok"]).to_pylist() == []
 
 
 def test_numbers_are_stored_by_their_bytes_and_words_by_a_dictionary(table):

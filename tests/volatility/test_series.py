@@ -155,9 +155,9 @@ def test_blocks_do_not_depend_on_the_pieces(length):
         finder = RunFinder(10.0, length)
         for piece in pieces:
             finder.add(time[piece], segment[piece], rest[piece])
-        means = BlockMeans(finder.runs(), 2)
+        means = BlockMeans(finder.runs())
         found = [means.add(list(rate[piece].T), time[piece], segment[piece]) for piece in pieces]
-        found.append(means.rest())
+        found += [last] if (last := means.rest()) is not None else []
         for name in ("values", "time", "segment", "stretch"):
             joined = np.concatenate([getattr(part, name) for part in found])
             np.testing.assert_array_equal(joined, getattr(whole, name))

@@ -52,6 +52,12 @@ _ALL = (
         Column("temp_{temperature}", "°C", "temperature channel"),
         Column("{gyro}", "deg/s", "rate along the gyro's axis"),
     )),
+    Schema("series", 1, "the series that volatility is analysed in: means of blocks of samples, in pieces without a gap", (
+        Column("time", "s", "time of the block's first sample"),
+        _SEGMENT,
+        Column("stretch", "", "number of the run without a missing block, within which windows lie"),
+        Column("{gyro}", "deg/s", "mean rate of the block; at the full rate, the rate itself"),
+    )),
     Schema("arch_lm", 1, "Engle's test for ARCH effects", (
         Column("gyro", "", "gyro"),
         Column("series", "", "level, detrended or standardised"),
@@ -90,7 +96,14 @@ _ALL = (
         Column("p_value_s", "1", "its probability under chi²(s)"),
         Column("status", "", "converged; boundary (margin), not positive definite, one gyro, too short, failed"),
     )),
-    Schema("weights", 1, "weights of one model and mode, one row a sample of the volatility series", (
+    Schema("fits", 1, "how the fits of the rolling windows ended, over the recording", (
+        Column("time_start", "s", "start of the bin; a window counts where its middle is"),
+        Column("time_stop", "s", "end of the bin"),
+        Column("subject", "", "gyro, or dcc"),
+        Column("status", "", "as in garch and dcc"),
+        Column("windows", "", "number of windows; none has no row"),
+    )),
+    Schema("weights", 1, "weights of each model and mode, one row a sample of the volatility series", (
         _TIME, _SEGMENT,
         Column("model", "", "dcc or ccc"),
         Column("mode", "", "in_sample or causal"),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 METADATA_KEY = b"vgyro"
 ROW_GROUP = 1 << 18
 HASH_BLOCK = 1 << 20
+COUNTED = ("frames", "rates", "series")
+"""Tables whose numbers come from the counts of a converter: few different ones, over and over."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class TableWriter:
 
     extra       : JSON-able, added to the metadata
     compression : of Parquet; "none" for a file that is read once
+    row_group   : most rows in a row group
     """
 
     def __init__(
@@ -77,9 +80,10 @@ class TableWriter:
         provenance: Provenance,
         extra: Mapping[str, Any] | None = None,
         compression: str = "zstd",
+        row_group: int = ROW_GROUP,
     ) -> None:
         self._path, self._schema, self._provenance, self._extra = Path(path), schema, provenance, dict(extra or {})
-        self._compression = compression
+        self._compression, self._row_group = compression, row_group
         self._writer: pq.ParquetWriter | None = None
 
     def __enter__(self) -> TableWriter:
@@ -92,12 +96,19 @@ class TableWriter:
         table = columns if isinstance(columns, pa.Table) else pa.table(dict(columns))
         if self._writer is None:
             self._writer = self._open(table.schema)
-        self._writer.write_table(table.cast(self._writer.schema), row_group_size=ROW_GROUP)
+        self._writer.write_table(table.cast(self._writer.schema), row_group_size=self._row_group)
+
+    @property
+    def begun(self) -> bool:
+        """Was anything appended, be it an empty table?"""
+        return self._writer is not None
 
     def _open(self, schema: pa.Schema) -> pq.ParquetWriter:
         described = schema.with_metadata({METADATA_KEY: self._metadata(schema.names)})
-        # Numbers of a measurement hardly repeat: their bytes, not a dictionary, are what can be compressed.
-        numbers = [field.name for field in schema if pa.types.is_floating(field.type)]
+        # Computed numbers hardly repeat: their bytes, not a dictionary, are what can be compressed.
+        counted = self._schema in COUNTED
+        floats = [field.name for field in schema if pa.types.is_floating(field.type)]
+        numbers = [name for name in floats if not counted or name == "time"]
         split = numbers if self._compression != "none" else False
         others = [field.name for field in schema if field.name not in numbers]
         return pq.ParquetWriter(
@@ -173,10 +184,49 @@ def read_rows(path: str | Path, columns: list[str], start: int, stop: int) -> di
     return {name: table.column(name).to_numpy() for name in columns}
 
 
+def row_groups(
+    path: str | Path, columns: list[str] | None = None, first: int = 0, every: int = 1
+) -> Iterator[pa.Table]:
+    """The row groups of a table, in order: from number `first` on, each `every`th."""
+    # Not iter_batches: that keeps all pages that it has read until the end.
+    file = pq.ParquetFile(path)
+    for index in range(first, file.num_row_groups, every):
+        yield file.read_row_group(index, columns=columns)
+
+
 def read_batches(path: str | Path, columns: list[str]) -> Iterator[dict[str, np.ndarray]]:
-    """A table's columns as NumPy arrays, ROW_GROUP rows at a time, in order."""
-    for batch in pq.ParquetFile(path).iter_batches(ROW_GROUP, columns=columns):
-        yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in columns}
+    """Columns of a table as NumPy arrays, a row group at a time, in order."""
+    for table in row_groups(path, columns):
+        yield {name: table.column(name).to_numpy() for name in columns}
+
+
+class RowStream:
+    """Rows of tables that follow each other, taken from the front in any number; holds little more than it gives."""
+
+    def __init__(self, tables: Iterable[pa.Table]) -> None:
+        self._tables = iter(tables)
+        self._held: list[pa.Table] = []
+
+    def take(self, count: int) -> pa.Table:
+        """The next `count` rows, fewer at the end.  raises : ValueError if there is no table at all"""
+        while sum(table.num_rows for table in self._held) < count:
+            table = next(self._tables, None)
+            if table is None:
+                break
+            self._held.append(table)
+        if not self._held:
+            raise ValueError("no table to take rows from")
+        whole = pa.concat_tables(self._held).unify_dictionaries()
+        self._held = [whole.slice(count)]
+        return whole.slice(0, count)
+
+
+def words(codes: np.ndarray, names: Sequence[str]) -> pa.DictionaryArray:
+    """Codes [T], places in `names`, as a dictionary-encoded column; it holds only the names that occur, sorted."""
+    occurring = np.bincount(codes, minlength=len(names)) > 0
+    kept = sorted({name for name, there in zip(names, occurring, strict=True) if there})
+    places = np.array([kept.index(name) if there else 0 for name, there in zip(names, occurring, strict=True)])
+    return pa.DictionaryArray.from_arrays(pa.array(places.astype(np.int32)[codes]), pa.array(kept, pa.string()))
 
 
 def read_frame(path: str | Path) -> pd.DataFrame:

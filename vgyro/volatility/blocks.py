@@ -106,8 +106,8 @@ class Blocks:
 class BlockMeans:
     """Makes the blocks: `add` the samples piece by piece, in order, and take the blocks that are complete."""
 
-    def __init__(self, runs: Runs, gyros: int) -> None:
-        self._runs, self._gyros, self._count = runs, gyros, 0
+    def __init__(self, runs: Runs) -> None:
+        self._runs, self._count = runs, 0
         slots = runs.slots(runs.stop - 1) - runs.slots(runs.start) + 1
         # A run's last block is complete when the run reaches its last slot.
         self._complete = slots // runs.length
@@ -117,7 +117,7 @@ class BlockMeans:
         self._last, self._stretch = -2, -1
 
     def add(self, rate: Sequence[np.ndarray], time: np.ndarray, segment: np.ndarray) -> Blocks:
-        """The blocks that end in the next samples; rate: N arrays [B] deg/s, time [B] s, segment [B]."""
+        """The blocks that end in the next samples; rate: N arrays [B] deg/s (N may be 0), time [B] s, segment [B]."""
         run, sample = self._used(len(time))
         inside = sample - self._count
         self._count += len(time)
@@ -126,19 +126,16 @@ class BlockMeans:
         slot = self._runs.slots(sample) - self._runs.slots(self._runs.start)[run]
         block = slot // self._runs.length + self._first[run]
         if self._runs.length == 1:
-            return self._numbered(block, np.column_stack(rate), time, segment)
+            return self._numbered(block, _columns(rate, len(time)), time, segment)
         first = np.flatnonzero(np.diff(block, prepend=-1))
         count = np.diff(first, append=len(block))
-        sums = np.column_stack([np.add.reduceat(one, first, dtype=float) if len(first) else one for one in rate])
+        sums = _columns([np.add.reduceat(one, first, dtype=float) if len(first) else one for one in rate], len(first))
         return self._whole(block[first], run[first], count, sums, time[first], segment[first])
 
-    def rest(self) -> Blocks:
-        """The last block, after all samples."""
-        empty = np.empty(0, dtype=np.int64)
+    def rest(self) -> Blocks | None:
+        """What the last block gives, after all samples; None if none was begun."""
         found, self._open = self._open, ()
-        if found:
-            return self._good(*found)
-        return Blocks(np.empty((0, self._gyros)), np.empty(0), empty, empty.astype(np.int32))
+        return self._good(*found) if found else None
 
     def _used(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Run and number of each of the next `count` samples that lie in a run."""
@@ -190,3 +187,7 @@ class BlockMeans:
         if len(block):
             self._last, self._stretch = int(block[-1]), int(stretch[-1])
         return Blocks(values, time, segment, stretch.astype(np.int32))
+
+
+def _columns(rate: Sequence[np.ndarray], rows: int) -> np.ndarray:
+    return np.column_stack(rate) if rate else np.empty((rows, 0))

@@ -51,17 +51,18 @@ def block_means(
     A recording too long to be held goes through vgyro.volatility.blocks piece by piece.
     """
     rate = np.asarray(rate, dtype=float)
-    samples, n = rate.shape
+    samples = len(rate)
     length = block_length(rate_hz, block_hz)
     segment = np.zeros(samples, dtype=np.int32) if segment is None else np.asarray(segment)
     use = np.ones(samples, dtype=bool) if rest is None else np.asarray(rest, dtype=bool)
     time = np.arange(samples) / rate_hz if time is None else np.asarray(time, dtype=float)
     finder = RunFinder(rate_hz, length)
     finder.add(time, segment, use)
-    means = BlockMeans(finder.runs(), n)
+    means = BlockMeans(finder.runs())
     pieces = [slice(start, start + PIECE) for start in range(0, max(samples, 1), PIECE)]
     parts = [means.add(list(rate[piece].T), time[piece], segment[piece]) for piece in pieces]
-    parts.append(means.rest())
+    if (last := means.rest()) is not None:
+        parts.append(last)
     values, when, where, stretch = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("values", "time", "segment", "stretch")
     )
