@@ -32,17 +32,17 @@ def dcc_windows(count: int, seed: int, samples: int = WINDOW, gyros: int = GYROS
 
 
 def covariance_path(count: int, seed: int, gyros: int = GYROS) -> np.ndarray:
-    """A path of covariance matrices [count, gyros, gyros], each near the one before, with active bounds in most.
+    """A path of covariance matrices [count, gyros, gyros], each near the one before; bounds are active in most, and change.
 
     Correlation by a common part of unequal size, deviations that wander: the set of gyros with a weight changes.
     """
     rng = np.random.default_rng(seed)
-    load = np.linspace(0.4, 1.4, gyros)
-    base = np.outer(load, load) + np.diag(np.linspace(0.3, 0.6, gyros))
+    load = np.linspace(0.5, 0.9, gyros)
+    base = np.outer(load, load) + np.diag(np.linspace(0.8, 1.0, gyros))
     deviation = np.empty((count, gyros))
     state = np.zeros(gyros)
     for t in range(count):
-        state = 0.999 * state + 0.02 * rng.standard_normal(gyros)
+        state = 0.995 * state + 0.03 * rng.standard_normal(gyros)
         deviation[t] = np.exp(state / 2)
     return deviation[:, :, None] * base * deviation[:, None, :]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vgyro.storage.tables import Provenance, write_json, write_table
+from vgyro.storage.tables import Provenance, TableWriter, write_json, write_table
 from vgyro.tasks.common import Task
 
 GYROS = ("g1", "g2", "g3", "g4")
@@ -333,7 +333,7 @@ def _write_volatility(folder: Path, gyros: tuple[str, ...]) -> None:
         "beta": 0.9 - 0.03 * wave,
         "se_omega": 1e-6 + 0 * wave, "se_alpha": 0.02 + 0 * wave, "se_beta": 0.05 + 0 * wave,
         "log_likelihood": -500 + wave,
-        "status": np.where(wave < -0.8, "boundary", "converged"),
+        "status": np.where(wave < -0.8, "boundary: α = 0", "converged"),
     }  # fmt: skip
     write_table(folder / "garch.parquet", garch, "garch", PROVENANCE)
     single = len(gyros) == 1
@@ -349,22 +349,34 @@ def _write_volatility(folder: Path, gyros: tuple[str, ...]) -> None:
     write_table(folder / "dcc.parquet", dcc, "dcc", PROVENANCE)
     time = np.arange(1200) + 0.5
     fading = 0.3 - 0.2 * (time > 600) if not single else np.ones(len(time))
-    weights: dict[str, list[Any]] = {}
-    for mode in ("in_sample", "causal"):
-        part: dict[str, Any] = {
-            "time": time,
-            "segment": np.zeros(len(time), dtype=int),
-            "model": ["dcc"] * 1200,
-            "mode": [mode] * 1200,
-        }
-        part["sigma"] = 0.02 + 0 * time
-        for index, gyro in enumerate(gyros):
-            part[f"w_{gyro}"] = fading if index == 3 or single else (1 - fading) / 3
-            part[f"sd_{gyro}"] = NOISE.get(gyro, 0.05) * (1 + 0.1 * np.sin(time / 100))
-        part["status"] = np.where(time < 360, "no model yet", "ok") if mode == "causal" else np.full(1200, "ok")
-        for key, value in part.items():
-            weights.setdefault(key, []).extend(np.asarray(value).tolist())
-    write_table(folder / "weights.parquet", weights, "weights", PROVENANCE)
+    blocks = [["dcc", "in_sample"], ["dcc", "causal"]]
+    extra = {"blocks": blocks, "samples": len(time)}
+    with TableWriter(folder / "weights.parquet", "weights", PROVENANCE, extra) as writer:
+        for model, mode in blocks:
+            part: dict[str, Any] = {"time": time, "segment": np.zeros(len(time), dtype=int)}
+            part |= {"model": [model] * len(time), "mode": [mode] * len(time), "sigma": 0.02 + 0 * time}
+            for index, gyro in enumerate(gyros):
+                part[f"w_{gyro}"] = fading if index == 3 or single else (1 - fading) / 3
+                part[f"sd_{gyro}"] = NOISE.get(gyro, 0.05) * (1 + 0.1 * np.sin(time / 100))
+            waiting = time < 360 if mode == "causal" else np.zeros(len(time), dtype=bool)
+            part["status"] = np.where(waiting, "no model yet", "ok")
+            writer.append(part)
+    _write_fits(folder, gyros)
+
+
+def _write_fits(folder: Path, gyros: tuple[str, ...]) -> None:
+    """Three bins of time, ten windows each; the last gyro is stuck in the middle one."""
+    rows = []
+    for start in (0.0, 400.0, 800.0):
+        for gyro in gyros:
+            stuck = gyro == gyros[-1] and start == 400.0
+            ended = {"no variance": 10} if stuck else {"converged": 8, "boundary: α = 0": 2}
+            rows += [(start, start + 400.0, gyro, status, windows) for status, windows in ended.items()]
+        ended = {"one gyro": 10} if len(gyros) == 1 else {"converged": 7, "boundary: a = 0": 1, "boundary margin": 2}
+        rows += [(start, start + 400.0, "dcc", status, windows) for status, windows in ended.items()]
+    names = ("time_start", "time_stop", "subject", "status", "windows")
+    columns = {name: [row[place] for row in rows] for place, name in enumerate(names)}
+    write_table(folder / "fits.parquet", columns, "fits", PROVENANCE)
 
 
 @pytest.fixture(scope="session")

@@ -108,7 +108,7 @@ _AT_REST = ("static",)
 
 
 def _why_undefined(column: str, note: str) -> str:
-    if note == "boundary":
+    if note.startswith("boundary"):
         return f"{column} is not defined: the estimate lies on the boundary of its range"
     return f"{column} is not defined: {note}" if note else f"{column} is not defined"
 

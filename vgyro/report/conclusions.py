@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.report.crosscheck import failures
+from vgyro.report.fits import NO_USE
 from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, Value, rows_of
 from vgyro.report.noise import method_labels
 from vgyro.report.numbers import percent, significant
@@ -22,6 +23,7 @@ SHORTEST_TAU = 1.0
 MOST_NAMED = 6
 SIMPLE = ("average", "median", "inverse_variance_arw")
 MOST_LOST = 1e-3
+MOST_UNFITTED = 0.01
 AT_REST_KINDS = ("static", "thermal", "free")
 REST_FACTORS = (("if_sigma", "1σ"), ("if_bias_drift", "bias drift"))
 IN_SAMPLE = "_in_sample"
@@ -266,8 +268,8 @@ def _arch_sentences(dataset: DatasetPart) -> list[Conclusion]:
         left: list[str] = []
         tested = 0
         for array in recording.arrays:
-            table = array.volatility.get("level", {}).get("arch_lm", {})
-            for row in rows_of(table):
+            level = array.volatility.get("level")
+            for row in rows_of(level.arch_lm or {}) if level else ():
                 if row["status"] == "ok":
                     rejects = row["p_value"] < LEVEL_OF_TEST
                     tested += row["series"] == "level"
@@ -296,6 +298,8 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
             whose = "all gyros" if everyone else named(falling)
             text = f"{recording.name} is too short for the floor of {whose}: the Allan curve still falls at its end"
             found.append(Conclusion(f"{text}, so bias drift is an upper limit.", "warn", recording.arrays[0].anchor))
+    for array in dataset.arrays:
+        found += _unfitted(array)
     failed = {array.anchor: failures(array) for array in dataset.arrays if failures(array)}
     if failed:
         places = "; ".join(
@@ -316,6 +320,25 @@ def _incomplete(recording: RecordingPart) -> list[Conclusion]:
         text = f"{recording.name} lacks {percent(1 - frames['good_share'], 2)} of its frames; no figure bridges a gap."
         return [Conclusion(text, "warn", "recordings")]
     return []
+
+
+def _unfitted(array: ArrayPart) -> list[Conclusion]:
+    """Gyros that have no usable GARCH model in more than a few windows, by the definition where it is worst."""
+    worst: dict[str, tuple[float, str, str]] = {}
+    for definition, part in array.volatility.items():
+        for one in part.garch:
+            lost = {status: one.statuses[status] for status in NO_USE if status in one.statuses}
+            share = sum(lost.values()) / max(one.windows, 1)
+            if share > max(MOST_UNFITTED, worst.get(one.gyro, (0.0,))[0]):
+                worst[one.gyro] = share, max(lost, key=lost.__getitem__), definition
+    if not worst:
+        return []
+    listed = "; ".join(
+        f"{gyro} {percent(share, 2)} of the windows, mostly {status} (definition {definition})"
+        for gyro, (share, status, definition) in worst.items()
+    )
+    text = f"Windows without a usable GARCH model ({array.recording}, axis {array.axis}): {listed}."
+    return [Conclusion(text, "warn", array.anchor)]
 
 
 def _falling(array: ArrayPart) -> list[str]:

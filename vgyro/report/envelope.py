@@ -2,37 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 MAX_POINTS = 2000
 GAP = 3.0  # times the usual step
 
 
-def envelope(time: np.ndarray, values: np.ndarray, points: int = MAX_POINTS) -> tuple[np.ndarray, np.ndarray]:
+class Envelope:
     """Minimum and maximum of each of points/2 runs of neighbouring samples, in turn, as one zigzag curve.
 
-    time [T], values [T, N] or [T] → time [M], values [M, N] or [M]; M <= points. A short series comes back as it is.
-    A run whose values are all NaN gives NaN.
+    length : samples of the whole series, which comes in pieces and is never held;  columns : names of its columns
+    A short series comes back as it is. A run whose values are all NaN gives NaN.
     """
-    length = len(time)
-    if length <= points:
-        return time, values
-    edges = np.linspace(0, length, points // 2 + 1).astype(np.int64)[:-1]
-    hollow = np.isnan(values)
-    low = np.minimum.reduceat(np.where(hollow, np.inf, values), edges, axis=0)
-    high = np.maximum.reduceat(np.where(hollow, -np.inf, values), edges, axis=0)
-    zigzag = np.stack([low, high], axis=1).reshape(-1, *values.shape[1:])
-    zigzag[~np.isfinite(zigzag)] = np.nan
-    stops = np.append(edges[1:], length) - 1
-    return np.stack([time[edges], time[stops]], axis=1).ravel(), zigzag
+
+    def __init__(self, length: int, columns: Sequence[str], points: int = MAX_POINTS) -> None:
+        count = length if length <= points else points // 2
+        self._edges = np.linspace(0, length, count + 1).astype(np.int64)
+        self._whole = length <= points
+        self._done = 0
+        self._first, self._last = np.zeros(count), np.zeros(count)
+        self._low = {name: np.full(count, np.inf) for name in columns}
+        self._high = {name: np.full(count, -np.inf) for name in columns}
+
+    def feed(self, time: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
+        """Take the next samples: time [P] and every column [P]."""
+        if not len(time):
+            return
+        begin, end = self._done, self._done + len(time)
+        first = int(np.searchsorted(self._edges, begin, side="right")) - 1
+        stop = int(np.searchsorted(self._edges, end, side="left"))
+        bins = slice(first, stop)
+        starts = np.maximum(self._edges[bins], begin) - begin
+        opened = self._edges[bins] >= begin
+        self._first[bins][opened] = time[starts[opened]]
+        ends = np.minimum(self._edges[first + 1 : stop + 1], end) - begin
+        self._last[bins] = time[ends - 1]
+        for name, low in self._low.items():
+            values = np.asarray(columns[name], dtype=float)
+            # fmin and fmax pass over NaN, which only the slower of the two ways needs.
+            least, most = (np.fmin, np.fmax) if np.isnan(values).any() else (np.minimum, np.maximum)
+            low[bins] = np.fmin(low[bins], least.reduceat(values, starts))
+            self._high[name][bins] = np.fmax(self._high[name][bins], most.reduceat(values, starts))
+        self._done = end
+
+    def result(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """time [M] and each column [M]; M <= points."""
+        if self._whole:
+            return self._first, {name: _finite(low) for name, low in self._low.items()}
+        zigzag = {name: _finite(np.stack([low, self._high[name]], axis=1).ravel()) for name, low in self._low.items()}
+        return np.stack([self._first, self._last], axis=1).ravel(), zigzag
 
 
-def thin(time: np.ndarray, values: np.ndarray, points: int = MAX_POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Every k-th sample, the last one included, for curves that change slowly; M <= points."""
-    if len(time) <= points:
-        return time, values
-    chosen = np.linspace(0, len(time) - 1, points).round().astype(np.int64)
-    return time[chosen], values[chosen]
+def _finite(values: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def places_of(length: int, points: int = MAX_POINTS) -> np.ndarray:
+    """Numbers of at most `points` samples, evenly spaced, the last one included: for curves that change slowly."""
+    return np.linspace(0, length - 1, points).round().astype(np.int64) if length > points else np.arange(length)
 
 
 def logarithmic(frequency: np.ndarray, values: np.ndarray, points: int = MAX_POINTS) -> tuple[np.ndarray, np.ndarray]:
@@ -54,13 +83,11 @@ def logarithmic(frequency: np.ndarray, values: np.ndarray, points: int = MAX_POI
     return at[keep], both[keep]
 
 
-def stretches(time: np.ndarray, flag: np.ndarray) -> list[tuple[float, float]]:
-    """(start, stop) of each run of true values of `flag` [T], in the unit of `time` [T]."""
+def stretches(flag: np.ndarray) -> list[tuple[int, int]]:
+    """First and last place of each run of true values of `flag` [T]."""
     padded = np.concatenate([[False], flag.astype(bool), [False]])
     changes = np.flatnonzero(padded[1:] != padded[:-1])
-    return [
-        (float(time[start]), float(time[stop - 1])) for start, stop in zip(changes[::2], changes[1::2], strict=True)
-    ]
+    return [(int(start), int(stop) - 1) for start, stop in zip(changes[::2], changes[1::2], strict=True)]
 
 
 def broken(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -41,19 +41,96 @@ class Value:
 
 
 @dataclass(frozen=True)
+class RatesPart:
+    """Rates of a recording as they are drawn.
+
+    time [M], gyros {name: [M]} : least and greatest value of each run of samples in turn;  reference [M] or None
+    rest        : the same of the samples at rest alone, {name: [M]}; empty where the board always or never rests
+    spans       : stretches at rest, (start, stop) s; empty where it always or never rests
+    still       : share of the samples that are at rest
+    temperature_time [P], temperatures {name: [P]} : some samples
+    """
+
+    time: np.ndarray
+    gyros: Table
+    rest: Table
+    reference: np.ndarray | None
+    spans: tuple[tuple[float, float], ...]
+    still: float
+    temperature_time: np.ndarray
+    temperatures: Table
+
+
+@dataclass(frozen=True)
+class GarchSummary:
+    """GARCH of one gyro. alpha, beta : medians over the windows that have a model;  whole : row of the whole record
+
+    statuses : of the windows, status → how many
+    """
+
+    gyro: str
+    windows: int
+    alpha: float
+    beta: float
+    statuses: Mapping[str, int]
+    whole: Record | None
+
+
+@dataclass(frozen=True)
+class DccSummary:
+    """DCC of an array. a, b : medians;  statuses, whole : as for GARCH
+
+    rejects : p_value, p_value_s → share of the tested windows below 5 %; NaN where none was tested
+    curves  : time, a, b of some of the fitted windows
+    """
+
+    windows: int
+    a: float
+    b: float
+    rejects: Mapping[str, float]
+    statuses: Mapping[str, int]
+    whole: Record | None
+    curves: Table
+
+
+@dataclass(frozen=True)
+class WeightCurves:
+    """Weights of one model and mode. curves : time, w_{gyro}, sd_{gyro}, sigma of some samples
+
+    statuses : of all samples, status → how many
+    """
+
+    model: str
+    mode: str
+    curves: Table
+    statuses: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class VolatilityPart:
+    """Volatility analysis of one array by one definition of r_t. fits : map of the fits over time"""
+
+    arch_lm: Table | None = None
+    garch: tuple[GarchSummary, ...] = ()
+    dcc: DccSummary | None = None
+    weights: tuple[WeightCurves, ...] = ()
+    fits: Table | None = None
+
+
+@dataclass(frozen=True)
 class ArrayPart:
     """One array in one recording.
 
     gyros      : names, in the board's order
     tables     : correlation, allan, spectrum, metrics, methods, crosscheck: columns as arrays; absent ones are missing
-    volatility : definition → arch_lm, garch, dcc, weights
+    volatility : definition → its part
     """
 
     recording: str
     axis: str
     gyros: tuple[str, ...]
     tables: Mapping[str, Table]
-    volatility: Mapping[str, Mapping[str, Table]]
+    volatility: Mapping[str, VolatilityPart]
 
     @property
     def anchor(self) -> str:
@@ -77,12 +154,12 @@ class ArrayPart:
 
 @dataclass(frozen=True)
 class RecordingPart:
-    """One recording. rates : columns of rates.parquet, None where there are none;  arrays : one an axis"""
+    """One recording. rates : None where there are none;  arrays : one an axis"""
 
     name: str
     kind: str
     integrity: Record
-    rates: Table | None = None
+    rates: RatesPart | None = None
     arrays: tuple[ArrayPart, ...] = ()
 
     @property
@@ -121,8 +198,3 @@ def rows_of(table: Table) -> Iterator[dict[str, Any]]:
     names = list(table)
     for values in zip(*(table[name] for name in names), strict=True):
         yield dict(zip(names, values, strict=True))
-
-
-def chosen(table: Table, mask: np.ndarray) -> dict[str, np.ndarray]:
-    """The rows of a table where `mask` is true."""
-    return {name: column[mask] for name, column in table.items()}

@@ -7,7 +7,7 @@ name, so that a page is the same from run to run.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -52,6 +52,22 @@ class Curve:
 
 
 @dataclass(frozen=True)
+class Bars:
+    """Rectangles of one kind. name : unique in the plot, also in the legend;  colour : a mark of vgyro.report.colours
+
+    left, right, bottom, top : arrays [R];  hover : title → values [R] that the pointer shows
+    """
+
+    name: str
+    colour: str
+    left: np.ndarray
+    right: np.ndarray
+    bottom: np.ndarray
+    top: np.ndarray
+    hover: Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
 class Axis:
     """An axis: what it shows with its unit, and its scale."""
 
@@ -86,6 +102,58 @@ def curve_plot(
     item = {"json": _escaped(_as_json(plot, identifier)), "height": height}
     legend = _legend(curves) if len(curves) > 1 else ()
     return macro("plot", identifier=identifier, title=title, summary=summary, item=item, legend=legend)
+
+
+def bar_plot(
+    identifier: str, title: str, bars: Sequence[Bars], x: Axis, ticks: Sequence[tuple[float, str]], *, height: int = 300
+) -> Markup:
+    """A plot of rectangles in rows, with a legend whose entries show and hide a kind.
+
+    ticks : (height, name) of each row; the rest as for curve_plot
+    """
+    from bokeh.models import FixedTicker
+
+    plot = _empty(x, Axis(""), height)
+    plot.ygrid.grid_line_color = None
+    plot.yaxis.ticker = FixedTicker(ticks=[place for place, _ in ticks])
+    plot.yaxis.major_label_overrides = dict(ticks)
+    drawn = [_draw_bars(plot, kind) for kind in bars]
+    for kind, renderer in zip(bars, drawn, strict=True):
+        _hover_over_bars(plot, kind, renderer)
+    item = {"json": _escaped(_as_json(plot, identifier)), "height": height}
+    entries = tuple(
+        {
+            "name": kind.name,
+            "label": kind.name,
+            "visible": True,
+            "variable": marks()[kind.colour],
+            "width": 8,
+            "dashes": "",
+        }
+        for kind in bars
+    )
+    return macro("plot", identifier=identifier, title=title, summary="", item=item, legend=(("", entries),))
+
+
+def _draw_bars(plot: figure, bars: Bars) -> Any:
+    from bokeh.models import ColumnDataSource, Quad
+
+    sides = {side: _single(getattr(bars, side)) for side in ("left", "right", "bottom", "top")}
+    source = ColumnDataSource({**sides, **{title: _told(values) for title, values in bars.hover.items()}})
+    return plot.add_glyph(
+        source, Quad(**{side: side for side in sides}, fill_color=bars.colour, line_color=None), name=bars.name
+    )
+
+
+def _told(values: np.ndarray) -> Any:
+    return values.tolist() if values.dtype == object else _single(values)
+
+
+def _hover_over_bars(plot: figure, bars: Bars, renderer: Any) -> None:
+    from bokeh.models import HoverTool
+
+    tooltips = [("", bars.name), *((title, f"@{{{title}}}") for title in bars.hover)]
+    plot.add_tools(HoverTool(renderers=[renderer], tooltips=tooltips, visible=False))
 
 
 def _empty(x: Axis, y: Axis, height: int) -> figure:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from markupsafe import Markup
 
-from vgyro.report.envelope import broken, envelope, stretches, thin
+from vgyro.report.envelope import broken
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import ArrayPart, RecordingPart, Table, rows_of
 from vgyro.report.numbers import duration, rounded
@@ -15,7 +15,6 @@ from vgyro.report.tables import Cell, Column, render_table
 TIME = Axis("time, s")
 RATE = Axis("rate, deg/s")
 REFERENCE = "reference"
-TEMPERATURE = "temp_"
 
 
 def rates_plots(recording: RecordingPart, array: ArrayPart) -> Markup:
@@ -23,40 +22,30 @@ def rates_plots(recording: RecordingPart, array: ArrayPart) -> Markup:
     rates = recording.rates
     if rates is None:
         return Markup("")
-    time, at_rest = rates["time"], rates["at_rest"].astype(bool)
-    everywhere, nowhere = bool(at_rest.all()), not at_rest.any()
-    spans = [] if everywhere or nowhere else stretches(time, at_rest)
-    if everywhere:
-        words = "at rest throughout"
-    elif nowhere:
-        words = "never known to be at rest"
+    if rates.spans:
+        share = duration(float(sum(stop - start for start, stop in rates.spans)))
+        words = f"tinted: {len(rates.spans)} stretches at rest, {share} together"
     else:
-        share = duration(float(sum(stop - start for start, stop in spans)))
-        words = f"tinted: {len(spans)} stretches at rest, {share} together"
+        words = "at rest throughout" if rates.still else "never known to be at rest"
     summary = f"{words}; each point is the least or greatest value of a short run of samples"
     title = f"Rates, axis {array.axis}"
-    whole = curve_plot(
-        f"rates-{array.anchor}", title, _rate_curves(rates, array), TIME, RATE, summary=summary, spans=spans
-    )
+    curves = _rate_curves(rates.time, rates.gyros, array)
+    if rates.reference is not None:
+        curves.append(Curve(REFERENCE, REFERENCE, rates.time, rates.reference, ink=True, width=1))
+    spans = rates.spans
+    whole = curve_plot(f"rates-{array.anchor}", title, curves, TIME, RATE, summary=summary, spans=spans)
     if not spans:
         return whole
-    still = {name: np.where(at_rest, rates[name], np.nan) for name in array.gyros}
-    curves = _rate_curves({"time": time, **still}, array)
-    return join(whole, curve_plot(f"rest-{array.anchor}", f"{title}, at rest only", curves, TIME, RATE, spans=spans))
+    still = _rate_curves(rates.time, rates.rest, array)
+    return join(whole, curve_plot(f"rest-{array.anchor}", f"{title}, at rest only", still, TIME, RATE, spans=spans))
 
 
-def _rate_curves(rates: Table, array: ArrayPart) -> list[Curve]:
-    values = np.column_stack([rates[name] for name in array.gyros])
-    time, values = broken(*envelope(rates["time"], values))
-    curves = [
+def _rate_curves(time: np.ndarray, columns: Table, array: ArrayPart) -> list[Curve]:
+    time, values = broken(time, np.column_stack([columns[name] for name in array.gyros]))
+    return [
         Curve(name, name, time, values[:, i], colour=i, width=1, behind=_spread(values[:, i]))
         for i, name in enumerate(array.gyros)
     ]
-    reference = rates.get(REFERENCE)
-    if reference is not None and np.isfinite(reference).any():
-        time, thinned = envelope(rates["time"], reference)
-        curves.append(Curve(REFERENCE, REFERENCE, time, thinned, ink=True, width=1))
-    return curves
 
 
 def _spread(values: np.ndarray) -> float:
@@ -67,14 +56,12 @@ def _spread(values: np.ndarray) -> float:
 
 def temperature_plot(recording: RecordingPart) -> Markup:
     """Temperatures of a recording over time; nothing where none is logged."""
-    rates = recording.rates or {}
-    names = [name for name in rates if name.startswith(TEMPERATURE)]
-    if not names:
+    rates = recording.rates
+    if rates is None or not rates.temperatures:
         return Markup("")
-    time, values = thin(rates["time"], np.column_stack([rates[name] for name in names]))
     curves = [
-        Curve(name, name.removeprefix(TEMPERATURE), time, values[:, i], colour=i, width=1.2)
-        for i, name in enumerate(names)
+        Curve(name, name, rates.temperature_time, values, colour=i, width=1.2)
+        for i, (name, values) in enumerate(rates.temperatures.items())
     ]
     identifier = f"temperature-{recording.name}"
     return curve_plot(identifier, "Temperature", curves, TIME, Axis("temperature, °C"), height=240)
@@ -91,7 +78,7 @@ def correlation_table(recording: RecordingPart, array: ArrayPart) -> Markup:
         [Cell(name), *(_correlation_cell(found.get((name, other)), name == other) for other in array.gyros)]
         for name in array.gyros
     ]
-    still = recording.rates is None or bool(recording.rates["at_rest"].any())
+    still = recording.rates is None or recording.rates.still > 0
     of = "samples at rest" if still else "rate − reference"
     caption = f"Correlation factors of the gyros' noise, {of} (Jiang et al. 2012, eq. 22); below, 95 % limits"
     return render_table(columns, rows, caption, compact=True)

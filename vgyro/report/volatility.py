@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup
 
-from vgyro.report.envelope import thin
+from vgyro.report.fits import fits_map, shares
 from vgyro.report.html import details, heading, join, paragraph
-from vgyro.report.model import ArrayPart, Table, chosen, rows_of
-from vgyro.report.numbers import MISSING, percent, probability, significant
+from vgyro.report.model import ArrayPart, DccSummary, GarchSummary, Record, Table, VolatilityPart, WeightCurves, rows_of
+from vgyro.report.numbers import MISSING, count, percent, probability, significant
 from vgyro.report.plots import Axis, Curve, curve_plot
 from vgyro.report.tables import Cell, Column, Row, render_table
 
-WHOLE = -1
 LEVEL_OF_TEST = 0.05
-WEIGHT_POINTS = 600
 TIME = Axis("time, s")
 SERIES = ("level", "detrended", "standardised")
 MEANING = {
@@ -41,7 +39,7 @@ def volatility_part(array: ArrayPart) -> Markup:
     """ARCH-LM of all definitions, then one part that opens for each definition."""
     if not array.volatility:
         return paragraph("The recording is too short at rest for a rolling window: no volatility analysis.", "note")
-    parts = [_definition_part(array, name, tables) for name, tables in array.volatility.items()]
+    parts = [_definition_part(array, name, part) for name, part in array.volatility.items()]
     return join(heading("Volatility", 4), _arch_lm(array), *parts)
 
 
@@ -54,10 +52,10 @@ def _arch_lm(array: ArrayPart) -> Markup:
             Column("kurtosis", group=series),
         ]
     rows: list[Row | list[Cell]] = []
-    for definition, tables in array.volatility.items():
-        if "arch_lm" in tables:
+    for definition, part in array.volatility.items():
+        if part.arch_lm is not None:
             rows.append(Row(heading=MEANING.get(definition, definition)))
-            rows += _arch_rows(tables["arch_lm"])
+            rows += _arch_rows(part.arch_lm)
     caption = "ARCH-LM test (Engle 1982) of the longest gap-free stretch at rest; rejections at 5 % are bold"
     return join(render_table(columns, rows, caption, compact=True), paragraph(ARCH_WORDS, "note"))
 
@@ -86,76 +84,73 @@ def _arch_cells(row: dict | None) -> list[Cell]:
     ]
 
 
-def _definition_part(array: ArrayPart, definition: str, tables: dict[str, Table] | object) -> Markup:
-    assert isinstance(tables, dict)
+def _definition_part(array: ArrayPart, definition: str, part: VolatilityPart) -> Markup:
     anchor = f"{array.anchor}-{definition}"
-    parts = [_garch(tables["garch"]) if "garch" in tables else Markup("")]
-    if "dcc" in tables:
-        parts.append(_dcc(anchor, tables["dcc"]))
-    if "weights" in tables:
-        parts.append(_weights(anchor, array, tables["weights"]))
+    parts = [_garch(part.garch)] if part.garch else []
+    if part.dcc is not None:
+        parts.append(_dcc(anchor, part.dcc))
+    if part.fits is not None:
+        parts.append(fits_map(anchor, array.gyros, part.fits))
+    if part.weights:
+        parts.append(_weights(anchor, array, part.weights))
     return details(f"GARCH, DCC and weights, definition “{definition}”", join(*parts))
 
 
-def _garch(table: Table) -> Markup:
+def _garch(summaries: Sequence[GarchSummary]) -> Markup:
     columns = [
         Column("gyro", numeric=False),
         Column("windows", group="rolling windows"),
         Column("median α", group="rolling windows"),
         Column("median β", group="rolling windows"),
-        Column("status of the fits", numeric=False, group="rolling windows"),
         Column("ω", "(deg/s)²", group="whole record"),
         Column("α", group="whole record"),
         Column("β", group="whole record"),
         Column("status", numeric=False, group="whole record"),
     ]
-    rows = []
-    for gyro in dict.fromkeys(table["gyro"].tolist()):
-        mine = chosen(table, table["gyro"] == gyro)
-        windows, whole = chosen(mine, mine["window"] != WHOLE), chosen(mine, mine["window"] == WHOLE)
-        fitted = np.isfinite(windows["alpha"])
-        medians = [float(np.median(windows[name][fitted])) if fitted.any() else np.nan for name in ("alpha", "beta")]
-        cells = [Cell(gyro), Cell(str(len(fitted))), *(Cell(significant(value)) for value in medians)]
-        rows.append([*cells, Cell(_shares(windows["status"])), *_whole_garch(whole)])
+    rows = [
+        [
+            Cell(one.gyro),
+            Cell(count(one.windows)),
+            Cell(significant(one.alpha)),
+            Cell(significant(one.beta)),
+            *_whole_garch(one.whole),
+        ]
+        for one in summaries
+    ]
     caption = "GARCH(1,1), h_t = ω + α e²_(t−1) + β h_(t−1); below α and β, one robust standard error either way"
     return render_table(columns, rows, caption, compact=True)
 
 
-def _whole_garch(whole: Table) -> list[Cell]:
-    if not len(whole["window"]):
+def _whole_garch(row: Record | None) -> list[Cell]:
+    if row is None:
         return [Cell(MISSING, tone="muted", hint="not fitted")] * 4
-    row = next(rows_of(whole))
     cells = [Cell(significant(float(row["omega"])))]
     for name in ("alpha", "beta"):
-        value, error = float(row[name]), float(row[f"se_{name}"])
-        cells.append(Cell(significant(value), f"± {significant(error, 2)}" if np.isfinite(error) else ""))
+        cells.append(_with_error(float(row[name]), float(row[f"se_{name}"])))
     return [*cells, Cell(str(row["status"]))]
 
 
-def _shares(statuses: np.ndarray) -> str:
-    counts = Counter(statuses.tolist())
-    total = sum(counts.values())
-    return ", ".join(f"{name} {percent(number / total)}" for name, number in counts.most_common())
+def _with_error(value: float, error: float) -> Cell:
+    return Cell(significant(value), f"± {significant(error, 2)}" if np.isfinite(error) else "")
 
 
-def _dcc(anchor: str, table: Table) -> Markup:
-    windows, whole = chosen(table, table["window"] != WHOLE), chosen(table, table["window"] == WHOLE)
-    fitted = np.isfinite(windows["a"])
-    if not fitted.any() and not np.isfinite(whole["a"]).any():
-        reasons = _shares(table["status"])
-        return join(paragraph(f"No DCC model: {reasons}.", "note"))
-    parts = [_dcc_table(windows, whole)]
-    if fitted.sum() > 1:
+def _dcc(anchor: str, summary: DccSummary) -> Markup:
+    whole = summary.whole
+    drawn = summary.curves["time"]
+    if not len(drawn) and (whole is None or not np.isfinite(whole["a"])):
+        return paragraph(f"No DCC model: {shares(summary.statuses)}.", "note")
+    parts = [_dcc_table(summary)]
+    if len(drawn) > 1:
         curves = [
-            Curve(name, name, windows["time_stop"][fitted], windows[name][fitted], colour=i, points=True)
-            for i, name in enumerate(("a", "b"))
+            Curve(name, name, drawn, summary.curves[name], colour=i, points=True) for i, name in enumerate(("a", "b"))
         ]
+        some = "" if len(drawn) == summary.windows else f"{count(len(drawn))} of {count(summary.windows)} windows"
         title = "DCC parameters, each window at its end"
-        parts.append(curve_plot(f"dcc-{anchor}", title, curves, TIME, Axis("a, b"), height=240))
+        parts.append(curve_plot(f"dcc-{anchor}", title, curves, TIME, Axis("a, b"), summary=some, height=240))
     return join(*parts, paragraph(TEST_WORDS, "note"))
 
 
-def _dcc_table(windows: Table, whole: Table) -> Markup:
+def _dcc_table(summary: DccSummary) -> Markup:
     columns = [
         Column("fitted to", numeric=False),
         Column("a"),
@@ -166,60 +161,54 @@ def _dcc_table(windows: Table, whole: Table) -> Markup:
         Column("status", numeric=False),
     ]
     rows: list[list[Cell]] = []
-    tested = np.isfinite(windows["p_value"])
-    if len(tested):
-        shares = [
-            percent(float(np.mean(windows[name][tested] < LEVEL_OF_TEST))) if tested.any() else MISSING
-            for name in ("p_value", "p_value_s")
+    if summary.windows:
+        cells = [
+            Cell(f"{count(summary.windows)} windows, median"),
+            *map(Cell, map(significant, (summary.a, summary.b))),
         ]
-        medians = [float(np.nanmedian(windows[n])) if np.isfinite(windows[n]).any() else np.nan for n in ("a", "b")]
-        cells = [Cell(f"{len(tested)} windows, median"), *(Cell(significant(value)) for value in medians), Cell("")]
-        rows.append([*cells, *(Cell(f"{share} reject") for share in shares), Cell(_shares(windows["status"]))])
-    for row in rows_of(whole):
-        cells = [Cell("whole record")]
-        for name in ("a", "b"):
-            error = float(row[f"se_{name}"])
-            cells.append(
-                Cell(significant(float(row[name])), f"± {significant(error, 2)}" if np.isfinite(error) else "")
-            )
-        cells += [Cell(significant(float(row["statistic"])))]
+        rejects = [Cell(f"{percent(summary.rejects[name])} reject") for name in ("p_value", "p_value_s")]
+        rows.append([*cells, Cell(""), *rejects, Cell(shares(summary.statuses))])
+    if summary.whole is not None:
+        row = summary.whole
+        cells = [
+            Cell("whole record"),
+            *(_with_error(float(row[name]), float(row[f"se_{name}"])) for name in ("a", "b")),
+        ]
+        cells.append(Cell(significant(float(row["statistic"]))))
         cells += [Cell(probability(float(row[name]))) for name in ("p_value", "p_value_s")]
         rows.append([*cells, Cell(str(row["status"]))])
     caption = "DCC(1,1) and the test of constant correlation; ± one two-step robust standard error"
     return render_table(columns, rows, caption, compact=True)
 
 
-def _weights(anchor: str, array: ArrayPart, table: Table) -> Markup:
-    parts = []
-    pairs = dict.fromkeys(zip(table["model"].tolist(), table["mode"].tolist(), strict=True))
-    for number, (model, mode) in enumerate(pairs):
-        mine = chosen(table, (table["model"] == model) & (table["mode"] == mode))
-        words = f"{model.upper()}, {mode.replace('_', '-')}"
-        if number == 0:
-            parts.append(_deviations(anchor, array, mine, words))
-        time, values = thin(mine["time"], np.column_stack([mine[f"w_{name}"] for name in array.gyros]), WEIGHT_POINTS)
-        curves = [Curve(name, name, time, values[:, i], colour=i) for i, name in enumerate(array.gyros)]
-        summary = _fallbacks(mine)
-        identifier = f"weights-{anchor}-{model}-{mode}"
-        parts.append(
-            curve_plot(identifier, f"Weights, {words}", curves, TIME, Axis("weight"), summary=summary, height=260)
-        )
-    return join(*parts)
+def _weights(anchor: str, array: ArrayPart, parts: Sequence[WeightCurves]) -> Markup:
+    plots = [_deviations(anchor, array, parts[0])]
+    for part in parts:
+        time = part.curves["time"]
+        curves = [Curve(name, name, time, part.curves[f"w_{name}"], colour=i) for i, name in enumerate(array.gyros)]
+        identifier = f"weights-{anchor}-{part.model}-{part.mode}"
+        title, axis = f"Weights, {_words(part)}", Axis("weight")
+        plots.append(curve_plot(identifier, title, curves, TIME, axis, summary=_fallbacks(part), height=260))
+    return join(*plots)
 
 
-def _deviations(anchor: str, array: ArrayPart, table: Table, words: str) -> Markup:
-    names = [f"sd_{name}" for name in array.gyros]
-    time, values = thin(table["time"], np.column_stack([table[name] for name in [*names, "sigma"]]), WEIGHT_POINTS)
-    curves = [Curve(name, name, time, values[:, i], colour=i) for i, name in enumerate(array.gyros)]
-    curves.append(Curve("fused", "fused", time, values[:, -1], ink=True, width=2))
-    if not np.isfinite(values).any():
+def _words(part: WeightCurves) -> str:
+    return f"{part.model.upper()}, {part.mode.replace('_', '-')}"
+
+
+def _deviations(anchor: str, array: ArrayPart, part: WeightCurves) -> Markup:
+    time = part.curves["time"]
+    curves = [Curve(name, name, time, part.curves[f"sd_{name}"], colour=i) for i, name in enumerate(array.gyros)]
+    curves.append(Curve("fused", "fused", time, part.curves["sigma"], ink=True, width=2))
+    if not any(np.isfinite(curve.y).any() for curve in curves):
         return Markup("")
-    title = f"Conditional standard deviation of each gyro and of the fused rate ({words})"
+    title = f"Conditional standard deviation of each gyro and of the fused rate ({_words(part)})"
     return curve_plot(f"sd-{anchor}", title, curves, TIME, Axis("√h, deg/s"), height=260)
 
 
-def _fallbacks(table: Table) -> str:
-    other = [status for status in table["status"].tolist() if status != "ok"]
+def _fallbacks(part: WeightCurves) -> str:
+    other = {status: number for status, number in part.statuses.items() if status != "ok"}
     if not other:
         return ""
-    return f"{percent(len(other) / len(table['status']))} of the samples: {Counter(other).most_common(1)[0][0]}"
+    share = sum(other.values()) / sum(part.statuses.values())
+    return f"{percent(share)} of the samples: {max(other, key=other.__getitem__)}"

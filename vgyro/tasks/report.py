@@ -11,12 +11,14 @@ from vgyro.config import DEFINITIONS
 from vgyro.dataset import Manifest
 from vgyro.metrics.figures import FIGURES
 from vgyro.report.dataset_page import headline, render_dataset
-from vgyro.report.model import ArrayPart, DatasetPart, Figure, Record, RecordingPart, Table
+from vgyro.report.model import ArrayPart, DatasetPart, Figure, RatesPart, Record, RecordingPart, Table
 from vgyro.storage.tables import read_columns, read_json, read_metadata, write_json, write_text
 from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.report_rates import read_rates
+from vgyro.tasks.report_volatility import read_volatility
 
-# Long, and drawn nowhere: the figures of the fused rates are in allan, spectrum and metrics.
-NOT_READ = ("fused",)
+# Long, and drawn nowhere: what is told of them is in allan, spectrum, metrics and arch_lm.
+NOT_READ = ("fused", "series")
 RESULTS = "results"
 
 
@@ -68,7 +70,7 @@ def read_dataset_part(task: Task) -> DatasetPart:
             recording.name,
             recording.kind,
             read_json(path),
-            read_rates(placed, recording.name, board),
+            rates_of(placed, recording.name, board),
             read_arrays(placed, recording.name, board),
         )
         for recording, path in zip(manifest.recordings, task.inputs["integrity"], strict=True)
@@ -86,17 +88,10 @@ def read_dataset_part(task: Task) -> DatasetPart:
     )
 
 
-def read_rates(placed: dict[Place, Path], recording: str, board: Board) -> Table | None:
-    """Columns of rates.parquet that are drawn; None where the recording has none."""
+def rates_of(placed: dict[Place, Path], recording: str, board: Board) -> RatesPart | None:
+    """Rates of a recording; None where it has none."""
     path = placed.get(Place(recording, "", "", "rates"))
-    if path is None:
-        return None
-    known = read_metadata(path)["units"]
-    gyros = {gyro.name for gyro in board.gyros}
-    drawn = [
-        name for name in known if name in gyros or name in {"time", "at_rest", "reference"} or name.startswith("temp_")
-    ]
-    return read_columns(path, drawn)
+    return None if path is None else read_rates(path, [gyro.name for gyro in board.gyros])
 
 
 def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tuple[ArrayPart, ...]:
@@ -104,20 +99,18 @@ def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tupl
     arrays = []
     for axis in board.axes:
         tables: dict[str, Table] = {}
-        volatility: dict[str, dict[str, Table]] = {}
+        volatility: dict[str, dict[str, Path]] = {}
         for place, path in placed.items():
             if (place.recording, place.axis) != (recording, axis) or place.table in NOT_READ:
                 continue
             if place.definition:
-                volatility.setdefault(place.definition, {})[place.table] = read_columns(path)
+                volatility.setdefault(place.definition, {})[place.table] = path
             else:
                 tables[place.table] = read_columns(path)
         if tables:
             gyros = tuple(gyro.name for gyro in board.array(axis))
-            ordered: dict[str, dict[str, Table]] = {
-                name: volatility[name] for name in DEFINITIONS if name in volatility
-            }
-            arrays.append(ArrayPart(recording, axis, gyros, tables, ordered))
+            parts = {name: read_volatility(volatility[name], gyros) for name in DEFINITIONS if name in volatility}
+            arrays.append(ArrayPart(recording, axis, gyros, tables, parts))
     return tuple(arrays)
 
 
