@@ -2,16 +2,24 @@
 
 #define SINGULAR 1e-12 /* as in vgyro.engine.covariance */
 #define NOISE (8 * 0x1p-53)
-#define GOOD_STEP 0x1p-27
+/* Steps of the refinement, by the largest x: after one so small there is no need of more precise residuals; the last. */
+#define WELL_CONDITIONED 0x1p-46
+#define LAST_STEP 0x1p-27
 #define REFINEMENTS 20
 #define BLOCK_EXCHANGES 16
 /* Ax is uncertain by this share of the largest x after the last step of the refinement, and more. */
 #define NEAR 0x1p-18
+#define GUESS_EXCHANGES 4
 #define EXCHANGES_EACH 64
 
 typedef uint64_t VG(bits) __attribute__((vector_size(32)));
 
 VG_INLINE v4 VG(absolute)(v4 x) { return (v4)((m4)x & INT64_MAX); }
+
+/* The same place of four arrays. */
+VG_INLINE v4 VG(gather)(const double *const *from, size_t place) {
+    return (v4){from[0][place], from[1][place], from[2][place], from[3][place]};
+}
 
 /* LDL' of A on the support; off it the matrix reads as the identity. Returns the lanes with positive pivots only.
    shift : factor of the diagonal. */
@@ -60,8 +68,11 @@ VG_INLINE void VG(substitute)(size_t n, const v4 *L, const v4 *inverse, const v4
 }
 
 /* residual = b - Ax, summed in twice the working precision; size = Σ|a x| of each row.
-   Products by Dekker (1971), sums by Knuth: Ogita, Rump & Oishi (2005), algorithm 5.3 (Dot2). */
-VG_INLINE void VG(residual)(size_t n, const v4 *A, const v4 *b, const v4 *x, v4 *residual, v4 *size) {
+   Products by Dekker (1971), sums by Knuth: Ogita, Rump & Oishi (2005), algorithm 5.3 (Dot2).
+   Not inlined: rarely called, and compilers would move half of it to where it is not needed. */
+static __attribute__((noinline)) void VG(residual)(
+    size_t n, const v4 *A, const v4 *b, const v4 *x, v4 *residual, v4 *size
+) {
     const v4 splitter = v4_set(0x1p27 + 1);
     v4 high_x[WEIGHTS_MAX], low_x[WEIGHTS_MAX];
 #pragma GCC unroll 8
@@ -89,29 +100,51 @@ VG_INLINE void VG(residual)(size_t n, const v4 *A, const v4 *b, const v4 *x, v4 
     }
 }
 
+/* b - Ax. */
+VG_INLINE void VG(plain_residual)(size_t n, const v4 *A, const v4 *b, const v4 *x, v4 *residual) {
+#pragma GCC unroll 8
+    for (size_t i = 0; i < n; i++) {
+        residual[i] = b[i];
+#pragma GCC unroll 8
+        for (size_t j = 0; j < n; j++) residual[i] -= A[i * n + j] * x[j];
+    }
+}
+
+/* One step of iterative refinement of x on the support, in the lanes `rough`. Returns max|step|/max|x|; *largest max|x| */
+VG_INLINE v4 VG(refine)(
+    size_t n, const v4 *L, const v4 *inverse, const v4 *residual, const m4 *support, m4 rough, v4 *x, v4 *largest
+) {
+    v4 wanted[WEIGHTS_MAX], step[WEIGHTS_MAX], largest_step = v4_set(0.0);
+    for (size_t i = 0; i < n; i++) wanted[i] = (v4)((m4)residual[i] & support[i]);
+    VG(substitute)(n, L, inverse, wanted, step);
+    *largest = v4_set(0.0);
+    for (size_t i = 0; i < n; i++) {
+        x[i] += (v4)((m4)step[i] & rough);
+        largest_step = v4_max(largest_step, VG(absolute)(step[i]));
+        *largest = v4_max(*largest, VG(absolute)(x[i]));
+    }
+    return largest_step / *largest;
+}
+
 /* x of Ax = b on the support, zero off it, to the last digits; and b - Ax of the rows off it, with its size.
    near : x and residuals smaller than this may have the wrong sign. Returns the lanes that could be solved. */
 VG_INLINE m4 VG(solve)(size_t n, const v4 *A, const v4 *b, const m4 *support, v4 *x, v4 *residual, v4 *size, v4 *near) {
-    v4 L[WEIGHTS_MAX * WEIGHTS_MAX], inverse[WEIGHTS_MAX], step[WEIGHTS_MAX], wanted[WEIGHTS_MAX];
+    v4 L[WEIGHTS_MAX * WEIGHTS_MAX], inverse[WEIGHTS_MAX], wanted[WEIGHTS_MAX], largest;
     const m4 solved = VG(factorise)(n, A, v4_set(1.0), support, L, inverse);
-    for (size_t i = 0; i < n; i++) wanted[i] = (v4)((m4)b[i] & support[i]);
+    for (size_t i = 0; i < n; i++) {
+        wanted[i] = (v4)((m4)b[i] & support[i]);
+        size[i] = v4_set(0.0); /* where the sign is clear without it */
+    }
     VG(substitute)(n, L, inverse, wanted, x);
-    m4 rough = solved, unclear = {0};
-    int count = 0;
-    do {
+    VG(plain_residual)(n, A, b, x, residual);
+    m4 rough = solved & (VG(refine)(n, L, inverse, residual, support, solved, x, &largest) > WELL_CONDITIONED);
+    for (int count = 0; count < REFINEMENTS && m4_any(rough); count++) {
         VG(residual)(n, A, b, x, residual, size);
-        for (size_t i = 0; i < n; i++) wanted[i] = (v4)((m4)residual[i] & support[i]);
-        VG(substitute)(n, L, inverse, wanted, step);
-        v4 largest_step = v4_set(0.0), largest = v4_set(0.0);
-        for (size_t i = 0; i < n; i++) {
-            x[i] += (v4)((m4)step[i] & rough);
-            largest_step = v4_max(largest_step, VG(absolute)(step[i]));
-            largest = v4_max(largest, VG(absolute)(x[i]));
-        }
         /* The next step would be smaller than this one as this one is than x. */
-        rough &= largest_step > GOOD_STEP * largest;
-        *near = NEAR * largest;
-    } while (m4_any(rough) && ++count < REFINEMENTS);
+        rough &= VG(refine)(n, L, inverse, residual, support, rough, x, &largest) > LAST_STEP;
+    }
+    *near = NEAR * largest;
+    m4 unclear = {0};
     for (size_t i = 0; i < n; i++) unclear |= ~support[i] & (VG(absolute)(residual[i]) <= *near);
     if (m4_any(unclear)) VG(residual)(n, A, b, x, residual, size);
     return solved & ~rough;
@@ -167,15 +200,15 @@ VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, m4 *support, v4 *w) {
     m4 open = good;
     while (m4_any(open)) {
         const m4 solved = VG(solve)(n, A, scale, support, x, residual, size, &near);
-        const m4 again = open & guess & ~(solved & VG(certain)(n, x, residual, near, support));
-        const m4 searching = open & ~guess;
-        good &= solved | ~searching;
-        const m4 changed = VG(exchange)(n, searching & solved, exchanges >= BLOCK_EXCHANGES, x, residual, size, support);
+        const m4 changed = VG(exchange)(n, open & solved, exchanges >= BLOCK_EXCHANGES, x, residual, size, support);
+        m4 again = open & guess & ~changed;
+        if (m4_any(again)) again &= ~(solved & VG(certain)(n, x, residual, near, support));
+        again |= guess & (exchanges >= GUESS_EXCHANGES);
+        good &= guess | ~open | (solved & (exchanges < EXCHANGES_EACH * (int64_t)n));
         for (size_t i = 0; i < n; i++) support[i] |= again;
-        guess = (m4){0};
-        exchanges -= changed;
-        good &= exchanges < EXCHANGES_EACH * (int64_t)n;
-        open = (again | changed) & good;
+        exchanges = (exchanges - changed) & ~again;
+        guess &= ~again;
+        open = (changed | again) & good;
     }
     v4 total = v4_set(0.0);
     for (size_t i = 0; i < n; i++) {
@@ -186,19 +219,25 @@ VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, m4 *support, v4 *w) {
     return good;
 }
 
+/* Each lane takes a run of matrices, which may follow from one another. */
 VG_INLINE void VG(min_variance_all)(size_t n, const double *H, size_t count, double *w) {
     v4 matrices[WEIGHTS_MAX * WEIGHTS_MAX], weights[WEIGHTS_MAX];
     m4 support[WEIGHTS_MAX];
+    const size_t run = (count + VG_LANES - 1) / VG_LANES;
     for (size_t i = 0; i < n; i++) support[i] = ~(m4){0};
-    for (size_t first = 0; first < count; first += VG_LANES) {
+    for (size_t step = 0; step < run; step++) {
+        size_t index[VG_LANES];
+        const double *from[VG_LANES];
         for (size_t lane = 0; lane < VG_LANES; lane++) {
-            const double *from = H + (first + lane < count ? first + lane : count - 1) * n * n;
-            for (size_t i = 0; i < n; i++)
-                for (size_t j = 0; j <= i; j++) matrices[i * n + j][lane] = from[i * n + j];
+            index[lane] = lane * run + step;
+            from[lane] = H + (index[lane] < count ? index[lane] : count - 1) * n * n;
         }
-        m4 good = VG(weigh)(n, matrices, support, weights);
-        for (size_t lane = 0; lane < VG_LANES && first + lane < count; lane++)
-            for (size_t i = 0; i < n; i++) w[(first + lane) * n + i] = good[lane] ? weights[i][lane] : NAN;
+        for (size_t i = 0; i < n; i++)
+            for (size_t j = 0; j <= i; j++) matrices[i * n + j] = VG(gather)(from, i * n + j);
+        const m4 good = VG(weigh)(n, matrices, support, weights);
+        for (size_t lane = 0; lane < VG_LANES; lane++)
+            for (size_t i = 0; i < n && index[lane] < count; i++)
+                w[index[lane] * n + i] = good[lane] ? weights[i][lane] : NAN;
     }
 }
 
@@ -224,10 +263,6 @@ VG_INLINE v4 VG(root)(v4 x) {
     for (int lane = 0; lane < VG_LANES; lane++) lanes[lane] = sqrt(lanes[lane]);
     memcpy(&x, lanes, sizeof x);
     return x;
-}
-
-VG_INLINE v4 VG(gather)(const double *const *from, size_t place) {
-    return (v4){from[0][place], from[1][place], from[2][place], from[3][place]};
 }
 
 /* e of sample t; `leading` loses the lanes where all of them are finite. */
