@@ -8,7 +8,7 @@ import pytest
 
 from vgyro.config import FusionOptions, VolatilityOptions
 from vgyro.errors import ConfigError, DataError
-from vgyro.fusion import METHODS, ArrayRates, CannotRun, FilterParameters, run_methods, select
+from vgyro.fusion import METHODS, ArrayRates, CannotRun, FilterParameters, SampleWeights, run_methods, select
 
 DEFINITIONS = ("level", "residual")
 PARAMETERS = FilterParameters(block_hz=10.0, moment_window_s=5.0, ewma_time_s=2.0)
@@ -18,7 +18,12 @@ def weights_for(samples, gyros):
     """Distinct weights for each model, mode and definition, so that a mix-up shows."""
     rng = np.random.default_rng(2)
     keys = [(m, o, d) for m in ("dcc", "ccc") for o in ("in_sample", "causal") for d in DEFINITIONS]
-    return {key: rng.dirichlet(np.ones(gyros), samples) for key in keys}
+    return {key: SampleWeights.of(rng.dirichlet(np.ones(gyros), samples), np.arange(samples)) for key in keys}
+
+
+def every(weights):
+    """Weights [T, N] of all samples."""
+    return np.concatenate(list(weights.pieces()))
 
 
 def test_every_method_runs_and_is_described(make_array):
@@ -34,8 +39,10 @@ def test_every_method_runs_and_is_described(make_array):
         assert np.isfinite(outcome.fused.rate).all()
         assert outcome.fused.rate.mean() == pytest.approx(1.0, abs=0.1)
         assert 0 < outcome.fused.dc_gain <= 1
-        if outcome.fused.weights is not None:
-            np.testing.assert_allclose(outcome.fused.weights.sum(axis=-1), 1.0, atol=1e-12)
+        weights = outcome.fused.weights
+        if weights is not None:
+            weights = every(weights) if isinstance(weights, SampleWeights) else weights
+            np.testing.assert_allclose(weights.sum(axis=-1), 1.0, atol=1e-12)
     names = [name for name in METHODS if METHODS[name].name != name]
     assert names == []
 
@@ -58,7 +65,7 @@ def test_two_sided_moments_look_ahead(make_array):
     before, after = (
         METHODS["ewma_two_sided"].fuse(replace(array, rate=rate), PARAMETERS) for rate in (array.rate, changed)
     )
-    assert (before.weights[2499] != after.weights[2499]).all()
+    assert (every(before.weights)[2499] != every(after.weights)[2499]).all()
 
 
 def test_average_and_median(make_array):
@@ -92,7 +99,7 @@ def block_squares(array, size):
 def test_rolling_moment_by_its_definition(make_array):
     # Expected: the mean of the last 50 blocks' squares, written as a loop.
     array = make_array(4000, [0.05, 0.1, 0.3])
-    weights = METHODS["rolling_moment"].fuse(array, PARAMETERS).weights
+    weights = every(METHODS["rolling_moment"].fuse(array, PARAMETERS).weights)
     square = block_squares(array, 20)
     for block in (0, 9, 10, 49, 50, 120, 199):
         past = square[max(0, block - 50) : block]
@@ -105,7 +112,7 @@ def test_rolling_moment_by_its_definition(make_array):
 def test_ewma_by_its_definition(make_array, name):
     # Expected: Σ e^(-age/τ)·square / Σ e^(-age/τ), written as a loop; τ = 2 s = 20 blocks.
     array = make_array(4000, [0.05, 0.1, 0.3])
-    weights = METHODS[name].fuse(array, PARAMETERS).weights
+    weights = every(METHODS[name].fuse(array, PARAMETERS).weights)
     square = block_squares(array, 20)
     for block in (10, 57, 199):
         number = np.arange(len(square))
@@ -122,7 +129,7 @@ def test_moments_follow_a_change(make_array):
     rate = array.rate.copy()
     rate[10000:, 0] *= 10
     for name in ("rolling_moment", "ewma_causal", "ewma_two_sided"):
-        weights = METHODS[name].fuse(replace(array, rate=rate), PARAMETERS).weights
+        weights = every(METHODS[name].fuse(replace(array, rate=rate), PARAMETERS).weights)
         assert weights[6000:9000, 0].mean() == pytest.approx(0.5, abs=0.1)
         assert weights[15000:, 0].mean() < 0.03
 
@@ -133,7 +140,7 @@ def test_dead_channel_has_no_weight(make_array):
     rate[:, 1] = 0.0
     for name in ("rolling_moment", "ewma_causal", "ewma_two_sided"):
         fused = METHODS[name].fuse(replace(array, rate=rate), PARAMETERS)
-        assert (fused.weights[1000:, 1] == 0).all()
+        assert (every(fused.weights)[1000:, 1] == 0).all()
         assert np.isfinite(fused.rate).all()
     silent = METHODS["ewma_causal"].fuse(replace(array, rate=np.zeros_like(rate)), PARAMETERS)
     assert (silent.rate == 0).all()
@@ -147,10 +154,10 @@ def test_moments_use_rest_only_where_it_is_known(make_array):
     moving = replace(PARAMETERS, in_motion=True)
     for name in ("rolling_moment", "ewma_causal"):
         known = METHODS[name].fuse(resting, moving)
-        assert known.weights[-1, 0] > 0.9
+        assert every(known.weights)[-1, 0] > 0.9
         assert "rest" in known.note
         unknown = METHODS[name].fuse(replace(array, at_rest=np.zeros(8000, dtype=bool)), moving)
-        assert unknown.weights[-1, 0] < 0.7
+        assert every(unknown.weights)[-1, 0] < 0.7
         assert "motion" in unknown.note
 
 
@@ -159,10 +166,11 @@ def test_gaps(make_array):
     segment = np.repeat([0, 1, 2], [2005, 7, 1988])
     array = make_array(4000, [0.05, 0.3], segment=segment)
     fused = METHODS["ewma_causal"].fuse(array, PARAMETERS)
-    np.testing.assert_array_equal(fused.weights[2005:2012], 0.5)
-    np.testing.assert_array_equal(fused.weights[2012], fused.weights[2031])
-    assert (fused.weights[2031] != fused.weights[2032]).all()
-    np.testing.assert_array_equal(fused.weights[2004], fused.weights[1999])
+    weights = every(fused.weights)
+    np.testing.assert_array_equal(weights[2005:2012], 0.5)
+    np.testing.assert_array_equal(weights[2012], weights[2031])
+    assert (weights[2031] != weights[2032]).all()
+    np.testing.assert_array_equal(weights[2004], weights[1999])
 
 
 def test_too_short_for_moments(make_array):
@@ -177,7 +185,7 @@ def test_conditional_weights_go_to_their_method(make_array):
     array = make_array(100, [0.1, 0.1, 0.1], weights=weights)
     for (model, mode, definition), w in weights.items():
         fused = METHODS[f"{model}_{mode}"].fuse(array, replace(PARAMETERS, definition=definition))
-        np.testing.assert_allclose(fused.rate, (array.rate * w).sum(axis=1), rtol=1e-12)
+        np.testing.assert_allclose(fused.rate, (array.rate * every(w)).sum(axis=1), rtol=1e-12)
     outcomes = run_methods(array, PARAMETERS, select(["dcc_causal"]), DEFINITIONS)
     assert [outcome.column for outcome in outcomes] == ["dcc_causal[level]", "dcc_causal[residual]"]
 
@@ -200,7 +208,9 @@ def test_reason_why_there_are_no_weights(make_array):
 
 def test_share_of_equal_weights_is_told(make_array):
     weights = weights_for(100, 3)
-    weights["dcc", "causal", "level"][:25] = 1 / 3
+    some = every(weights["dcc", "causal", "level"])
+    some[:25] = 1 / 3
+    weights["dcc", "causal", "level"] = SampleWeights.of(some, np.arange(100))
     (outcome,) = run_methods(
         make_array(100, [0.1] * 3, weights=weights), PARAMETERS, select(["dcc_causal"]), ("level",)
     )

@@ -1,4 +1,4 @@
-"""Minimum-variance weights and their way to the samples."""
+"""Minimum-variance weights."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from vgyro.engine.independent import nnls_weights
 from vgyro.errors import DataError, EngineError
-from vgyro.fusion import SampleWeights, block_of_sample, expand_weights, min_variance_weights, usable
+from vgyro.fusion import min_variance_weights, usable
 
 
 def covariances(count, size, rho, spread, seed=0):
@@ -126,27 +126,3 @@ def test_wrong_shape_and_unknown_engine():
         min_variance_weights(np.ones(3))
     with pytest.raises(EngineError, match="reference"):
         min_variance_weights(np.eye(2), engine="abacus")
-
-
-def test_blocks_reach_their_samples():
-    # 4 Hz samples; blocks of 1 s; a gap after 2.5 s; the second stretch begins at 10.1 s.
-    time = np.concatenate([np.arange(10) / 4, 10.1 + np.arange(6) / 4])
-    block = block_of_sample(time, np.array([0.0, 1.0, 10.1]), 1.0, 4.0)
-    assert block.tolist() == [0, 0, 0, 0, 1, 1, 1, 1, -1, -1, 2, 2, 2, 2, -1, -1]
-    weights = np.array([[1.0, 0.0], [0.3, 0.7], [0.0, 1.0]])
-    expanded = SampleWeights({("dcc", "causal", "level"): (weights, block)})["dcc", "causal", "level"]
-    np.testing.assert_array_equal(expanded, expand_weights(weights, block))
-    assert expanded[0].tolist() == [1.0, 0.0]
-    assert expanded[7].tolist() == [0.3, 0.7]
-    assert expanded[8].tolist() == [0.5, 0.5], "a sample in no block has equal weights"
-
-
-def test_block_borders_survive_rounded_time_stamps():
-    # One hour at 200 Hz, time stamps that accumulate rounding: every block must have its 200 samples.
-    time = np.cumsum(np.full(200 * 3600, 0.005)) - 0.005
-    block = block_of_sample(time, np.arange(3600.0), 1.0, 200.0)
-    assert (np.bincount(block) == 200).all()
-
-
-def test_no_blocks_at_all():
-    assert block_of_sample(np.arange(3.0), np.empty(0), 1.0, 1.0).tolist() == [-1, -1, -1]

@@ -6,8 +6,9 @@ from vgyro.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, Method
+    from vgyro.fusion.blocks import SampleWeights, block_of_sample
     from vgyro.fusion.registry import METHODS, Outcome, run_methods, select
-    from vgyro.fusion.weights import SampleWeights, block_of_sample, expand_weights, min_variance_weights, usable
+    from vgyro.fusion.weights import min_variance_weights, usable
 
 __all__ = [
     "METHODS",
@@ -20,7 +21,6 @@ __all__ = [
     "Outcome",
     "SampleWeights",
     "block_of_sample",
-    "expand_weights",
     "min_variance_weights",
     "run_methods",
     "select",
@@ -29,9 +29,15 @@ __all__ = [
 
 _ARRAY = ("ArrayNoise", "ArrayRates", "CannotRun", "FilterParameters", "Fused", "Method")
 _REGISTRY = ("METHODS", "Outcome", "run_methods", "select")
-_WEIGHTS = ("SampleWeights", "block_of_sample", "expand_weights", "min_variance_weights", "usable")
+_BLOCKS = ("SampleWeights", "block_of_sample")
+_WEIGHTS = ("min_variance_weights", "usable")
 
 __getattr__ = lazy_exports(
     __name__,
-    {**dict.fromkeys(_ARRAY, "array"), **dict.fromkeys(_REGISTRY, "registry"), **dict.fromkeys(_WEIGHTS, "weights")},
+    {
+        **dict.fromkeys(_ARRAY, "array"),
+        **dict.fromkeys(_BLOCKS, "blocks"),
+        **dict.fromkeys(_REGISTRY, "registry"),
+        **dict.fromkeys(_WEIGHTS, "weights"),
+    },
 )

@@ -11,6 +11,7 @@ import numpy as np
 
 from vgyro.config import FusionOptions
 from vgyro.errors import DataError
+from vgyro.fusion.blocks import SampleWeights
 from vgyro.units import arw_deg_s_rt_hz
 
 WeightKey = tuple[str, str, str]
@@ -50,9 +51,9 @@ class ArrayNoise:
 class ArrayRates:
     """One recording of one array.
 
-    rate    : array [T, N], deg/s;  rate_hz : sample rate, Hz
+    rate    : array [T, N], deg/s, float32 or float64, best with contiguous columns;  rate_hz : sample rate, Hz
     segment : array [T], number of the gap-free stretch;  at_rest : array [T] of bool
-    weights : (model, mode, definition) → weights [T, N], one row a sample; see vgyro.fusion.weights.SampleWeights
+    weights : (model, mode, definition) → weights of the samples
     no_weights : the same keys → why there are none
     """
 
@@ -61,7 +62,7 @@ class ArrayRates:
     segment: np.ndarray
     at_rest: np.ndarray
     noise: ArrayNoise
-    weights: Mapping[WeightKey, np.ndarray] = field(default_factory=dict)
+    weights: Mapping[WeightKey, SampleWeights] = field(default_factory=dict)
     no_weights: Mapping[WeightKey, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -95,6 +96,7 @@ class FilterParameters:
     block_hz        : rate of the block means whose second moments make weights, Hz
     moment_window_s, ewma_time_s : memory of these moments, s
     in_motion       : the board moves in this recording, at least in part
+    engine          : who runs the recursions
     definition      : definition of r_t, for the methods that have one each
     """
 
@@ -106,10 +108,13 @@ class FilterParameters:
     moment_window_s: float = 360.0
     ewma_time_s: float = 60.0
     in_motion: bool = False
+    engine: str = "native"
     definition: str = ""
 
     @classmethod
-    def of(cls, options: FusionOptions, in_motion: bool, block_hz: float = 1.0) -> FilterParameters:
+    def of(
+        cls, options: FusionOptions, in_motion: bool, block_hz: float = 1.0, engine: str = "native"
+    ) -> FilterParameters:
         """The user's options, for a recording at rest or in motion."""
         arw = options.arw_deg_rt_h
         return cls(
@@ -121,6 +126,7 @@ class FilterParameters:
             moment_window_s=options.moment_window_s,
             ewma_time_s=options.ewma_time_s,
             in_motion=in_motion,
+            engine=engine,
         )
 
 
@@ -129,7 +135,7 @@ class Fused:
     """A virtual gyroscope.
 
     rate               : array [T], deg/s
-    weights            : array [N] or [T, N]; None where the method has none
+    weights            : array [N], or those of each sample; None where the method has none
     dc_gain            : gain for a constant rate
     bandwidth_hz       : -3 dB bandwidth, Hz; NaN: not limited by the method
     noise_bandwidth_hz : noise-equivalent bandwidth, one-sided, Hz; NaN: not limited
@@ -138,7 +144,7 @@ class Fused:
     """
 
     rate: np.ndarray
-    weights: np.ndarray | None = None
+    weights: np.ndarray | SampleWeights | None = None
     dc_gain: float = 1.0
     bandwidth_hz: float = math.nan
     noise_bandwidth_hz: float = math.nan

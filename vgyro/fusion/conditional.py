@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 
 LEVEL_IN_MOTION = (
@@ -30,20 +28,20 @@ def conditional(model: str, mode: str) -> Callable[[ArrayRates, FilterParameters
             none = f"there are no {mode} weights of {model.upper()} for this definition of r_t"
             raise CannotRun(array.no_weights.get(key, none))
         weights = array.weights[key]
-        if weights.shape != array.rate.shape:
-            raise CannotRun(f"weights {weights.shape} do not fit the rates {array.rate.shape}")
-        note = _note(array, parameters, weights)
-        return Fused(np.einsum("tn,tn->t", array.rate, weights), weights, note=note)
+        shape = (len(weights.block), weights.gyros)
+        if shape != array.rate.shape:
+            raise CannotRun(f"weights {shape} do not fit the rates {array.rate.shape}")
+        fused, equal = weights.combine(array.rate)
+        return Fused(fused, weights, note=_note(array, parameters, equal))
 
     return fuse
 
 
-def _note(array: ArrayRates, parameters: FilterParameters, weights: np.ndarray) -> str:
+def _note(array: ArrayRates, parameters: FilterParameters, equal: float) -> str:
     notes = []
     # Where stretches at rest are known, only they were analysed: the motion has equal weights.
     if parameters.in_motion and not array.at_rest.any():
         notes.append(WARNINGS.get(parameters.definition, ""))
-    equal = float(np.mean(np.ptp(weights, axis=1) == 0))
     if equal > 0:
         notes.append(f"equal weights for {equal:.1%} of the samples: no window before them, motion, or a gap near")
     return "; ".join(note for note in notes if note)

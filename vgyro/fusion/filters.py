@@ -9,12 +9,15 @@ about 1/s - T/2; stamped with the next sample's time, as its index k + 1 says, i
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
+from vgyro import engine as engines
 from vgyro.errors import DataError
 from vgyro.fusion import design
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.blocks import combined
 
 ONE_SAMPLE = "row k holds x(k+1), which Z(k) yields (eq. 14)"
 
@@ -41,8 +44,7 @@ def chang_2012(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """
     D, u = _array_information(array, parameters)
     s = design.pole(D, design.q_for_bandwidth(D, parameters.bandwidth_hz))
-    combined = array.rate @ u
-    fused = np.concatenate([low_pass(combined[part], s, 1.0, array.period) for part in array.stretches()])
+    fused = _low_passed(array, parameters, u, s, 1.0)
     loss, lag = design.attenuation(0.1)
     note = f"q from the bandwidth; at BW/10 amplitude loss {loss:.2%} and lag {math.degrees(lag):.1f}°; {ONE_SAMPLE}"
     return _described(fused, u, s, 1.0, array.period, note)
@@ -58,47 +60,36 @@ def xue_2012(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """
     D, u = _array_information(array, parameters)
     q = _process_noise(D, parameters, math.inf)
-    combined = array.rate @ u
-    fused = np.concatenate([_settling_low_pass(combined[part], D, q, array.period) for part in array.stretches()])
-    return _described(fused, u, design.pole(D, q), 1.0, array.period, f"P0 = 1/(D·T), inferred; {ONE_SAMPLE}")
-
-
-def low_pass(signal: np.ndarray, s: float, gain: float, period: float) -> np.ndarray:
-    """First-order low-pass with a held input: y_k = e^(-sT)·y_{k-1} + (1 - e^(-sT))·gain·signal_k, y_{-1} = signal_0.
-
-    signal : array [T];  s : pole, rad/s;  gain : for a constant;  period : T, s
-    """
-    from scipy.signal import lfilter
-
-    keep = math.exp(-s * period)
-    filtered, _ = lfilter([-math.expm1(-s * period) * gain], [1.0, -keep], signal, zi=[keep * signal[0]])
-    return filtered
+    a, steady, initial = design.pole(D, q), design.steady_variance(D, q), 1.0 / (D * array.period)
+    keep, c = math.exp(-a * array.period), (initial - steady) / (initial + steady)
+    settle = engines.get(parameters.engine).kalman.settling_filter
+    fused = _by_stretch(array, u, lambda signal: settle(signal, keep, c, signal[0]))
+    return _described(fused, u, a, 1.0, array.period, f"P0 = 1/(D·T), inferred; {ONE_SAMPLE}")
 
 
 def _steady_state(array: ArrayRates, parameters: FilterParameters, tau: float) -> Fused:
     D, u = _array_information(array, parameters)
     q = _process_noise(D, parameters, tau)
     s, gain = design.pole(D, q, tau), design.dc_gain(D, q, tau)
-    combined = array.rate @ u
-    fused = np.concatenate([low_pass(combined[part], s, gain, array.period) for part in array.stretches()])
+    fused = _low_passed(array, parameters, u, s, gain)
     return _described(fused, u, s, gain, array.period, f"q = {q:.4g} deg²/s³, D = {D:.4g}; {ONE_SAMPLE}")
 
 
-def _settling_low_pass(signal: np.ndarray, D: float, q: float, period: float) -> np.ndarray:
-    a = math.sqrt(D * q)
-    steady, initial = math.sqrt(q / D), 1.0 / (D * period)
-    c = (initial - steady) / (initial + steady)
-    fused = np.empty(len(signal))
-    x = signal[0]
-    settling = min(len(signal), math.ceil(20.0 / (a * period)))
-    fading = c * np.exp(-2.0 * a * period * np.arange(settling + 1))
-    keep = math.exp(-a * period) * (1.0 - fading[:-1]) / (1.0 - fading[1:])
-    for index in range(settling):
-        x = keep[index] * x + (1.0 - keep[index]) * signal[index]
-        fused[index] = x
-    if settling < len(signal):
-        rest = np.concatenate([[x], signal[settling:]])
-        fused[settling:] = low_pass(rest, a, 1.0, period)[1:]
+def _low_passed(array: ArrayRates, parameters: FilterParameters, u: np.ndarray, s: float, gain: float) -> np.ndarray:
+    """u'Z through a first-order low-pass with a held input: y_k = e^(-sT)·y_{k-1} + (1 - e^(-sT))·gain·u'Z_k [T].
+
+    u : [N];  s : pole, rad/s;  gain : for a constant.  y_{-1} = u'Z_0 in each gap-free stretch.
+    """
+    keep, driven = math.exp(-s * array.period), -math.expm1(-s * array.period) * gain
+    low_pass = engines.get(parameters.engine).kalman.low_pass
+    return _by_stretch(array, u, lambda signal: low_pass(signal, keep, driven, signal[0]))
+
+
+def _by_stretch(array: ArrayRates, u: np.ndarray, run: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """run(u'Z) in each gap-free stretch [T]."""
+    fused = combined(array.rate, u)
+    for part in array.stretches():
+        fused[part] = run(fused[part])
     return fused
 
 

@@ -7,17 +7,37 @@ from dataclasses import replace
 import numpy as np
 
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.blocks import PIECE, combined
 
 
 def average(array: ArrayRates, parameters: FilterParameters) -> Fused:  # noqa: ARG001
     """The mean of the gyros."""
     size = array.rate.shape[1]
-    return Fused(array.rate.mean(axis=1), np.full(size, 1.0 / size))
+    return Fused(combined(array.rate, np.ones(size)) / size, np.full(size, 1.0 / size))
 
 
 def median(array: ArrayRates, parameters: FilterParameters) -> Fused:  # noqa: ARG001
     """The median of the gyros, sample by sample: not linear, so it has no weights and no transfer function."""
-    return Fused(np.median(array.rate, axis=1))
+    fused = np.empty(len(array.rate))
+    for start in range(0, len(fused), PIECE):
+        ordered = sorted_columns(array.rate[start : start + PIECE])
+        low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
+        fused[start : start + PIECE] = np.add(low, high, dtype=float) / 2
+    return Fused(fused)
+
+
+def sorted_columns(rate: np.ndarray) -> list[np.ndarray]:
+    """The smallest, second smallest, … of each row of rate [T, N], as N arrays [T].
+
+    By odd-even transposition: N rounds that compare neighbours (Knuth, The Art of Computer Programming 3, 5.3.4). For a
+    few columns that is far faster than sorting each row.
+    """
+    columns = [np.ascontiguousarray(column) for column in rate.T]
+    for turn in range(len(columns)):
+        for low in range(turn % 2, len(columns) - 1, 2):
+            pair = columns[low], columns[low + 1]
+            columns[low], columns[low + 1] = np.minimum(*pair), np.maximum(*pair)
+    return columns
 
 
 def inverse_variance_arw(array: ArrayRates, parameters: FilterParameters) -> Fused:  # noqa: ARG001
@@ -38,4 +58,4 @@ def _inverse_variance(array: ArrayRates, coefficient: np.ndarray, name: str) -> 
     # The largest is taken out first, so that the squares neither overflow nor vanish.
     inverse = (coefficient.max() / coefficient) ** 2
     weights = inverse / inverse.sum()
-    return Fused(array.rate @ weights, weights)
+    return Fused(combined(array.rate, weights), weights)

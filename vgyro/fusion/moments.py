@@ -8,105 +8,179 @@ the weights are held through the rest of it. Blocks are counted across gaps; no 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro import engine as engines
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
-from vgyro.fusion.weights import expand_weights
+from vgyro.fusion.blocks import SampleWeights
 
 # A moment of fewer blocks is too uncertain to weight by (10 values: a standard deviation of 45 %).
 FEWEST_BLOCKS = 10
 
+Moments = Iterator[tuple[np.ndarray, np.ndarray]]
+"""For one slice of blocks after the other: second moments [N, B], and how many blocks each is of [B]"""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Blocks of `size` samples of the rates [T, N] in the gap-free stretches; a remainder is of the last block.
+
+    first [M], first sample of each block; used [M], whether it counts; block [T], block of each sample, -1: of none
+    """
+
+    rate: np.ndarray
+    size: int
+    first: np.ndarray
+    used: np.ndarray
+    block: np.ndarray
+
+    def squares(self, blocks: slice) -> np.ndarray:
+        """Squares of the block means [N, B]; zero where a block does not count."""
+        samples = (self.first[blocks, None] + np.arange(self.size)).ravel()
+        means = [column[samples].reshape(-1, self.size).mean(axis=1, dtype=float) for column in self.rate.T]
+        return np.where(self.used[blocks], means, 0.0) ** 2
+
 
 def rolling_moment(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """w_i ∝ 1/m_i², m_i² = mean square of the block means of the last `moment_window_s` before this block."""
-    means, block, used = _blocks(array, parameters)
     length = max(FEWEST_BLOCKS, round(parameters.moment_window_s * parameters.block_hz))
-    total = np.vstack([np.zeros(means.shape[1]), np.cumsum(np.where(used[:, None], means, 0.0) ** 2, axis=0)])
-    count = np.concatenate([[0], np.cumsum(used)])
-    # The window reaches back over `length` used blocks, however long ago they were.
-    first = np.searchsorted(count, count[:-1] - length, side="left")
-    first = np.where(count[:-1] <= length, 0, first)
-    number = count[:-1] - count[first]
-    moment = (total[:-1] - total[first]) / np.maximum(number, 1)[:, None]
-    return _weighted(array, parameters, moment, number, block)
+    blocks = _blocks(array, parameters)
+    return _fused(array, parameters, blocks, lambda slices: _rolling(blocks, slices, length))
 
 
 def ewma_causal(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """w_i ∝ 1/m_i², m_i² = mean of the earlier blocks' squares with weights e^(-age/τ)."""
-    means, block, used = _blocks(array, parameters)
-    total, mass = _decayed(means**2, used, _keep(parameters))
-    number = np.concatenate([[0], np.cumsum(used)[:-1]])
-    return _weighted(array, parameters, total[:-1] / _positive(mass[:-1]), number, block)
+    blocks, decay = _blocks(array, parameters), Decay.of(parameters)
+    return _fused(array, parameters, blocks, lambda slices: _before(blocks, slices, decay))
 
 
 def ewma_two_sided(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """w_i ∝ 1/m_i², m_i² = mean of all blocks' squares with weights e^(-|age|/τ): it looks ahead."""
-    means, block, used = _blocks(array, parameters)
-    keep = _keep(parameters)
-    past, past_mass = _decayed(means**2, used, keep)
-    future, future_mass = _decayed((means**2)[::-1], used[::-1], keep)
-    total = past[1:] + keep * future[::-1][1:]
-    mass = past_mass[1:] + keep * future_mass[::-1][1:]
-    return _weighted(array, parameters, total / _positive(mass), np.full(len(means), used.sum()), block)
+    blocks, decay = _blocks(array, parameters), Decay.of(parameters)
+    return _fused(array, parameters, blocks, lambda slices: _around(blocks, slices, decay))
 
 
-def _keep(parameters: FilterParameters) -> float:
-    return math.exp(-1.0 / (parameters.block_hz * parameters.ewma_time_s))
+def _rolling(blocks: Blocks, slices: list[slice], length: int) -> Moments:
+    # Running totals after `behind`, behind + 1, … of the blocks that count: the window reaches back over `length` of
+    # those, however long ago they were.
+    total, behind = np.zeros((blocks.rate.shape[1], 1)), 0
+    for part in slices:
+        used = blocks.used[part]
+        count = behind + total.shape[1] - 1 + np.cumsum(used) - used
+        new = np.cumsum(np.hstack([total[:, -1:], blocks.squares(part)[:, used]]), axis=1)
+        total = np.hstack([total, new[:, 1:]])
+        first = np.maximum(count - length, 0)
+        yield (total[:, count - behind] - total[:, first - behind]) / np.maximum(count - first, 1), count - first
+        drop = max(0, total.shape[1] - length - 1)
+        total, behind = total[:, drop:], behind + drop
 
 
-def _decayed(square: np.ndarray, used: np.ndarray, keep: float) -> tuple[np.ndarray, np.ndarray]:
-    """Σ keep^(age)·square [M+1, N] and Σ keep^(age) [M+1, 1]; row k holds the blocks before k, the last at age 0."""
-    from scipy.signal import lfilter
+@dataclass(frozen=True)
+class Decay:
+    """Sums in which a block counts `keep` to the power of its age."""
 
-    columns = np.column_stack([np.where(used[:, None], square, 0.0), used.astype(float)])
-    decayed = np.vstack([np.zeros(columns.shape[1]), lfilter([1.0], [1.0, -keep], columns, axis=0)])
-    return decayed[:, :-1], decayed[:, -1:]
+    keep: float
+    low_pass: Callable[[np.ndarray, float, float, float], np.ndarray]
+
+    @classmethod
+    def of(cls, parameters: FilterParameters) -> Decay:
+        """Time constant `ewma_time_s`."""
+        keep = math.exp(-1.0 / (parameters.block_hz * parameters.ewma_time_s))
+        return cls(keep, engines.get(parameters.engine).kalman.low_pass)
+
+    def sums(self, blocks: Blocks, part: slice, start: np.ndarray, back: bool = False) -> np.ndarray:
+        """[N + 1, B + 1]: column k is Σ keep^age·square of each gyro, and Σ keep^age in the last row, of all blocks
+        before block k of the part, the nearest at age 0; with `back`, of block k and all after it.
+
+        start [N + 1] : the sums of what lies outside of the part
+        """
+        values = np.vstack([blocks.squares(part), blocks.used[part]])
+        rows = values[:, ::-1] if back else values
+        sums = np.column_stack(
+            [start, [self.low_pass(row, self.keep, 1.0, float(s)) for row, s in zip(rows, start, strict=True)]]
+        )
+        return sums[:, ::-1] if back else sums
+
+
+def _before(blocks: Blocks, slices: list[slice], decay: Decay) -> Moments:
+    past, known = np.zeros(blocks.rate.shape[1] + 1), 0
+    for part in slices:
+        sums = decay.sums(blocks, part, past)
+        number = known + np.cumsum(blocks.used[part]) - blocks.used[part]
+        yield sums[:-1, :-1] / _positive(sums[-1, :-1]), number
+        past, known = sums[:, -1], known + int(blocks.used[part].sum())
+
+
+def _around(blocks: Blocks, slices: list[slice], decay: Decay) -> Moments:
+    past = np.zeros(blocks.rate.shape[1] + 1)
+    # The sums over all blocks after each part, from the last part to the first; copies, so that nothing else is kept.
+    futures = [past]
+    for part in reversed(slices[1:]):
+        futures.append(decay.sums(blocks, part, futures[-1], back=True)[:, 0].copy())
+    known = int(blocks.used.sum())
+    for part, future in zip(slices, reversed(futures), strict=True):
+        before, after = decay.sums(blocks, part, past), decay.sums(blocks, part, future, back=True)
+        sums = before[:, 1:] + decay.keep * after[:, 1:]
+        yield sums[:-1] / _positive(sums[-1]), np.full(sums.shape[1], known)
+        past = before[:, -1]
 
 
 def _positive(mass: np.ndarray) -> np.ndarray:
     return np.where(mass > 0, mass, 1.0)
 
 
-def _blocks(array: ArrayRates, parameters: FilterParameters) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Block means [M, N], block of each sample [T], blocks that count [M]; a remainder is of the last block."""
+def _blocks(array: ArrayRates, parameters: FilterParameters) -> Blocks:
     size = max(1, round(array.rate_hz / parameters.block_hz))
-    means, used, block, number = [], [], np.full(len(array.rate), -1), 0
     standing = array.at_rest if array.at_rest.any() else np.ones(len(array.rate), dtype=bool)
+    block, number = np.full(len(array.rate), -1, dtype=np.int32), 0
+    first, used = [np.empty(0, dtype=np.int32)], [np.empty(0, dtype=bool)]
     for part in array.stretches():
         count = (part.stop - part.start) // size
         if count == 0:
             continue
         whole = slice(part.start, part.start + count * size)
-        means.append(array.rate[whole].reshape(count, size, -1).mean(axis=1))
-        used.append(standing[whole].reshape(count, size).all(axis=1))
-        block[part] = number + np.minimum(np.arange(part.stop - part.start) // size, count - 1)
+        first.append(np.arange(whole.start, whole.stop, size, dtype=np.int32))
+        used.append(np.all(standing[whole].reshape(count, size), axis=1))
+        block[whole] = np.repeat(np.arange(number, number + count, dtype=np.int32), size)
         number += count
-    if sum(int(part.sum()) for part in used) < FEWEST_BLOCKS:
+        block[whole.stop : part.stop] = number - 1
+    blocks = Blocks(array.rate, size, np.concatenate(first), np.concatenate(used), block)
+    if blocks.used.sum() < FEWEST_BLOCKS:
         raise CannotRun(
             f"fewer than {FEWEST_BLOCKS} blocks of {1.0 / parameters.block_hz:g} s",
             remedy="a longer recording is needed",
         )
-    return np.vstack(means), block, np.concatenate(used)
+    return blocks
 
 
-def _weighted(
-    array: ArrayRates, parameters: FilterParameters, moment: np.ndarray, number: np.ndarray, block: np.ndarray
+def _fused(
+    array: ArrayRates, parameters: FilterParameters, blocks: Blocks, moments: Callable[[list[slice]], Moments]
 ) -> Fused:
     """Fuse with weights ∝ 1/moment of each block; equal weights where fewer than FEWEST_BLOCKS blocks are known."""
-    size = moment.shape[1]
-    # A moment of exactly zero is a dead channel, not a perfect gyro.
-    alive = (moment > 0) & (number >= FEWEST_BLOCKS)[:, None]
-    inverse = np.where(alive, 1.0 / np.where(alive, moment, 1.0), 0.0)
-    total = inverse.sum(axis=1, keepdims=True)
-    weights = np.where(total > 0, inverse / _positive(total), 1.0 / size)
-    sample_weights = expand_weights(weights, block)
+
+    def rows(slices: list[slice]) -> Iterator[np.ndarray]:
+        return (_inverse(moment, number) for moment, number in moments(slices))
+
+    weights = SampleWeights(blocks.block, rows, array.rate.shape[1])
+    fused, equal = weights.combine(array.rate)
     notes = []
     if parameters.in_motion and not array.at_rest.any():
         notes.append("in motion the second moment holds the motion: these are not the weights of the noise")
     elif parameters.in_motion:
         notes.append("moments of the rest stretches only; weights are held through the motion")
-    equal = float(np.mean(np.append(~alive.any(axis=1), True)[block]))
     if equal > 0:
-        notes.append(f"equal weights for {equal:.1%} of the samples: fewer than {FEWEST_BLOCKS} blocks were known")
-    return Fused(np.einsum("tn,tn->t", array.rate, sample_weights), sample_weights, note="; ".join(notes))
+        few = f"fewer than {FEWEST_BLOCKS} blocks were known, or all their moments are the same"
+        notes.append(f"equal weights for {equal:.1%} of the samples: {few}")
+    return Fused(fused, weights, note="; ".join(notes))
+
+
+def _inverse(moment: np.ndarray, number: np.ndarray) -> np.ndarray:
+    """Weights [B, N] ∝ 1/moment [N, B]; number [B] of blocks that the moments are of."""
+    # A moment of exactly zero is a dead channel, not a perfect gyro.
+    alive = (moment > 0) & (number >= FEWEST_BLOCKS)
+    inverse = np.where(alive, 1.0 / np.where(alive, moment, 1.0), 0.0)
+    total = inverse.sum(axis=0)
+    return np.where(total > 0, inverse / _positive(total), 1.0 / len(moment)).T

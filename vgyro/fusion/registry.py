@@ -82,21 +82,37 @@ def run_methods(
     A method that cannot run, or whose rate is not finite, gives an Outcome without a rate and with the reason.
     An array of one gyro has nothing to fuse: no method runs.
     """
+    reason = _reason_against_all(array)
     for method in methods:
         for definition in definitions if method.per_definition else ("",):
-            yield _run(array, replace(parameters, definition=definition), method)
+            if reason:
+                yield Outcome(method, definition, "", None, reason)
+            else:
+                yield _run(array, replace(parameters, definition=definition), method)
+
+
+def _reason_against_all(array: ArrayRates) -> str:
+    """Why no method can run on these rates; empty if some can."""
+    if array.rate.shape[1] < 2:
+        return "one gyro: there is nothing to fuse"
+    finite = np.ones(len(array.rate), dtype=bool)
+    for column in array.rate.T:
+        finite &= np.isfinite(column)
+    return _not_finite(finite)
+
+
+def _not_finite(finite: np.ndarray) -> str:
+    return "" if finite.all() else f"{int((~finite).sum())} of {len(finite)} samples are not finite"
 
 
 def _run(array: ArrayRates, parameters: FilterParameters, method: Method) -> Outcome:
     definition = parameters.definition
-    if array.rate.shape[1] < 2:
-        return Outcome(method, definition, "", None, "one gyro: there is nothing to fuse")
     try:
         fused = method.fuse(array, parameters)
     except CannotRun as reason:
         return Outcome(method, definition, "", None, str(reason))
-    broken = int((~np.isfinite(fused.rate)).sum())
+    broken = _not_finite(np.isfinite(fused.rate))
     if broken:
-        return Outcome(method, definition, "", None, f"{broken} of {len(fused.rate)} samples are not finite")
+        return Outcome(method, definition, "", None, broken)
     column = f"{method.name}[{definition}]" if definition else method.name
     return Outcome(method, definition, column, fused, fused.note)

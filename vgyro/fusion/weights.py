@@ -1,16 +1,12 @@
-"""Minimum-variance weights, and weights of blocks brought to the samples of a recording."""
+"""Minimum-variance weights."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from vgyro import engine as engines
 from vgyro.engine.covariance import usable
 from vgyro.errors import DataError, EngineError
-from vgyro.fusion.array import WeightKey
 
 
 def min_variance_weights(H: np.ndarray, engine: str = "native") -> np.ndarray:
@@ -46,52 +42,3 @@ def _refuse_unusable(matrices: np.ndarray, leading: tuple[int, ...]) -> None:
         f"H[{', '.join(map(str, index))}]" if index else "H",
         "leave them out (vgyro.fusion.usable names them), or use equal weights there",
     )
-
-
-def block_of_sample(
-    time: np.ndarray,
-    block_time: np.ndarray,
-    block_s: float,
-    rate_hz: float,
-) -> np.ndarray:
-    """Number of the block that each sample lies in, -1 for none: array [T] of int.
-
-    time       : [T] of the samples, s
-    block_time : [M], time of each block's first sample, increasing, s
-    block_s    : length of a block, s
-    """
-    if len(block_time) == 0:
-        return np.full(len(time), -1)
-    # Half a sample keeps the rounding of time stamps away from the borders.
-    late = time + 0.5 / rate_hz
-    index = np.searchsorted(block_time, late, side="right") - 1
-    inside = index >= 0
-    index = np.maximum(index, 0)
-    inside &= late - block_time[index] < block_s
-    return np.where(inside, index, -1)
-
-
-def expand_weights(weights: np.ndarray, block: np.ndarray) -> np.ndarray:
-    """Weights of blocks [M, N] → of samples [T, N]; a sample in no block (-1) has equal weights."""
-    size = weights.shape[1]
-    rows = np.vstack([weights, np.full((1, size), 1.0 / size)])
-    return rows[block]
-
-
-@dataclass(frozen=True)
-class SampleWeights(Mapping[WeightKey, np.ndarray]):
-    """Weights of blocks that become weights of samples [T, N] only when they are looked up, to save memory.
-
-    blocks : (model, mode, definition) → (weights [M, N], block of each sample [T], -1: none)
-    """
-
-    blocks: Mapping[WeightKey, tuple[np.ndarray, np.ndarray]]
-
-    def __getitem__(self, key: WeightKey) -> np.ndarray:
-        return expand_weights(*self.blocks[key])
-
-    def __iter__(self) -> Iterator[WeightKey]:
-        return iter(self.blocks)
-
-    def __len__(self) -> int:
-        return len(self.blocks)

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 
 from vgyro.board import Board
 from vgyro.config import FusionOptions, VolatilityOptions
 from vgyro.dataset import AT_REST
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights, block_of_sample
 from vgyro.fusion.array import WeightKey
-from vgyro.storage.tables import read_columns, read_json
+from vgyro.storage.tables import ROW_GROUP, read_batches, read_json, read_metadata, read_rows
 from vgyro.tasks.common import Task
 from vgyro.tasks.rates_file import ArrayFile, read_array
 
 
 @dataclass(frozen=True)
 class OpenArray:
-    """One recording of one array, and how it is to be fused. time [T], s, belongs to the samples of `rates`."""
+    """One recording of one array, and how it is to be fused."""
 
     gyros: list[str]
-    time: np.ndarray
+    file: ArrayFile
     rates: ArrayRates
     parameters: FilterParameters
     fusion: FusionOptions
@@ -40,8 +43,9 @@ def open_array(task: Task) -> OpenArray:
     weights, reasons = read_weights(task.inputs.get("weights", []), gyros, file, block_hz)
     noise = read_noise(task.input("noise"), gyros)
     rates = ArrayRates(file.rate, file.rate_hz, file.segment, file.at_rest, noise, weights, reasons)
-    parameters = FilterParameters.of(fusion, in_motion(task.options["kind"], file.at_rest), block_hz)
-    return OpenArray(gyros, file.time, rates, parameters, fusion, volatility)
+    moving = in_motion(task.options["kind"], file.at_rest)
+    parameters = FilterParameters.of(fusion, moving, block_hz, analysis.get("engine", "native"))
+    return OpenArray(gyros, file, rates, parameters, fusion, volatility)
 
 
 def in_motion(kind: str, at_rest: np.ndarray) -> bool:
@@ -62,24 +66,67 @@ def read_noise(path: Path, gyros: list[str]) -> ArrayNoise:
 
 def read_weights(
     paths: list[Path], gyros: list[str], file: ArrayFile, block_hz: float
-) -> tuple[SampleWeights, dict[WeightKey, str]]:
+) -> tuple[dict[WeightKey, SampleWeights], dict[WeightKey, str]]:
     """Weights of every model, mode and definition, ready for the samples of the rates; and why there are none.
 
-    paths : weights.parquet, each in the folder that its definition names
+    paths : weights.parquet, each in the folder that its definition names. The weights stay there until they are used.
     file  : the samples;  block_hz : rate of the volatility series
     """
-    blocks: dict[WeightKey, tuple[np.ndarray, np.ndarray]] = {}
+    weights: dict[WeightKey, SampleWeights] = {}
     reasons: dict[WeightKey, str] = {}
+    columns = [f"w_{gyro}" for gyro in gyros]
+    block, last = np.empty(0, dtype=np.int32), None
+    for path in paths:
+        metadata = read_metadata(path)
+        count = metadata["samples"]
+        if count == 0:
+            continue
+        # The definitions have one series in common: its map is made once.
+        if last is None or not _same_times(path, last):
+            block, last = _blocks_of_samples(path, count, file, block_hz), path
+        for place, (model, mode) in enumerate(metadata["blocks"]):
+            key, first = (model, mode, path.parent.name), place * count
+            if _any_known(path, first, count):
+                weights[key] = SampleWeights(block, partial(rows_in_order, path, columns, first), len(gyros))
+            else:
+                reasons[key] = str(read_rows(path, ["status"], first, first + 1)["status"][0])
+    return weights, reasons
+
+
+def _blocks_of_samples(path: Path, count: int, file: ArrayFile, block_hz: float) -> np.ndarray:
     # As long as vgyro.volatility makes its blocks: a whole number of samples.
     block_s = max(1, round(file.rate_hz / block_hz)) / file.rate_hz
-    for path in paths:
-        rows = read_columns(path)
-        for model, mode in sorted(set(zip(rows["model"], rows["mode"], strict=True))):
-            chosen = (rows["model"] == model) & (rows["mode"] == mode)
-            key = (str(model), str(mode), path.parent.name)
-            if not np.isfinite(rows["sigma"][chosen]).any():
-                reasons[key] = str(rows["status"][chosen][0])
-                continue
-            weights = np.column_stack([rows[f"w_{gyro}"][chosen] for gyro in gyros])
-            blocks[key] = (weights, block_of_sample(file.time, rows["time"][chosen], block_s, file.rate_hz))
-    return SampleWeights(blocks), reasons
+    begins = np.concatenate([time[:, 0] for time in rows_in_order(path, ["time"], 0, _slices(count))])
+    times = (batch["time"] for batch in read_batches(file.path, ["time"]))
+    return np.concatenate([block_of_sample(time, begins, block_s, file.rate_hz) for time in times])
+
+
+def _same_times(path: Path, other: Path) -> bool:
+    counts = [read_metadata(one)["samples"] for one in (path, other)]
+    times = [rows_in_order(one, ["time"], 0, _slices(counts[0])) for one in (path, other)]
+    return counts[0] == counts[1] and all(np.array_equal(*pair) for pair in zip(*times, strict=True))
+
+
+def _any_known(path: Path, first: int, count: int) -> bool:
+    return any(np.isfinite(sigma).any() for sigma in rows_in_order(path, ["sigma"], first, _slices(count)))
+
+
+def _slices(count: int) -> list[slice]:
+    return [slice(start, min(start + ROW_GROUP, count)) for start in range(0, count, ROW_GROUP)]
+
+
+def rows_in_order(path: Path, columns: list[str], first: int, slices: Iterable[slice]) -> Iterator[np.ndarray]:
+    """Rows [B, columns] of one slice after the other, counted from row `first`; each row group is read once."""
+    file = pq.ParquetFile(path)
+    edges = np.cumsum([0, *(file.metadata.row_group(index).num_rows for index in range(file.num_row_groups))])
+
+    @lru_cache(maxsize=1)
+    def group(index: int) -> np.ndarray:
+        table = file.read_row_group(index, columns=columns)
+        return np.vstack([table.column(name).to_numpy() for name in columns])
+
+    for rows in slices:
+        start, stop = rows.start + first, rows.stop + first
+        groups = range(np.searchsorted(edges, start, side="right") - 1, np.searchsorted(edges, stop))
+        parts = [group(index)[:, max(0, start - edges[index]) : stop - edges[index]] for index in groups]
+        yield np.hstack([np.empty((len(columns), 0)), *parts]).T
