@@ -8,14 +8,15 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.engine import recursions
-from vgyro.engine.models import EIGENVALUE_MIN, DccFit, GarchFit
+from vgyro.engine.constant import constant_correlation_statistic
+from vgyro.engine.models import DccFit, GarchFit
 from vgyro.volatility.garch import _two_dimensional
 
 dcc_correlation = recursions.dcc_correlation
 
 
 def fit_dcc(
-    z: np.ndarray, engine: str = "reference", r: np.ndarray | None = None, margins: GarchFit | None = None
+    z: np.ndarray, engine: str = "native", r: np.ndarray | None = None, margins: GarchFit | None = None
 ) -> DccFit:
     """Fit Q_t = (1-a-b)S + a z_{t-1}z'_{t-1} + b Q_{t-1} by maximising the correlation likelihood.
 
@@ -27,17 +28,18 @@ def fit_dcc(
     raises  : TooShort if there is no sample at all; EngineError if the engine is unknown
 
     Conventions. S = z'z/T scaled to unit diagonal (the mean is zero), Q_1 = S, 1/T throughout; a >= 0, b >= 0,
-    a + b < 1. L_c has no constant: -½Σ(log|R| + z'R⁻¹z - z'z). Where a is 0, b is not identified: a = b = 0, status
-    `boundary`. The two-step standard errors (Engle & Sheppard 2001) hold S fixed; the inverse-Hessian ones take the
-    margins as known and the likelihood as right. There are none for a < 0.001, and no two-step ones where a margin is
-    at its boundary (status `boundary margin`).
+    a + b < 1. L_c has no constant: -½Σ(log|R| + z'R⁻¹z - z'z). The result is the greatest L_c of several starts, none
+    of which depends on another window. Where it gains less than 1e-6 a sample over a constant correlation, b is not
+    identified: a = b = 0, status `boundary: a = 0`. Standard errors are NaN unless the status is `converged`; the
+    two-step ones (Engle & Sheppard 2001) hold S fixed; the inverse-Hessian ones take the margins as known and the
+    likelihood as right, so that they also exist for `boundary margin`.
     S singular: status `not positive definite`, and the identity stands for S and for every R_t. N = 1: `one gyro`.
     Engle (2002); Liu et al. (2015), eq. 4-13.
     """
     return engines.get(engine).dcc.fit_dcc(_two_dimensional(z), r=r, margins=margins)
 
 
-def fit_ccc(z: np.ndarray, engine: str = "reference") -> DccFit:
+def fit_ccc(z: np.ndarray, engine: str = "native") -> DccFit:
     """Constant conditional correlation: DCC with a = b = 0 (Bollerslev 1990). z [T, N]; statuses as in fit_dcc."""
     return engines.get(engine).dcc.fit_ccc(_two_dimensional(z))
 
@@ -73,23 +75,5 @@ def constant_correlation_test(z: np.ndarray, lags: int = 1) -> Test:
     """
     from scipy.special import chdtrc
 
-    z = _two_dimensional(z)
-    samples, n = z.shape
-    nothing = Test(np.nan, lags + 1, np.nan, np.nan)
-    if n < 2 or samples < lags + 3 or not np.all(np.isfinite(z)):
-        return nothing
-    values, vectors = np.linalg.eigh(recursions.correlation_target(z))
-    if values[0] < EIGENVALUE_MIN:
-        return nothing
-    white = z @ ((vectors / np.sqrt(values)) @ vectors.T)
-    first, second = np.triu_indices(n, 1)
-    products = white[:, first] * white[:, second]
-    response = products[lags:].ravel()
-    design = np.stack(
-        [np.ones_like(response)] + [products[lags - lag : samples - lag].ravel() for lag in range(1, lags + 1)], axis=1
-    )
-    moments = np.einsum("ij,ik->jk", design, design)
-    coefficients = np.linalg.solve(moments, np.einsum("ij,i->j", design, response))
-    rest = response - (design * coefficients).sum(axis=1)
-    statistic = float(coefficients @ moments @ coefficients / np.mean(np.square(rest)))
+    statistic = constant_correlation_statistic(_two_dimensional(z), lags)
     return Test(statistic, lags + 1, float(chdtrc(lags + 1, statistic)), float(chdtrc(lags, statistic)))

@@ -1,32 +1,20 @@
-"""One window of an array, some gyros of which may have no model: the fits of those that have."""
+"""Windows of an array, some gyros of which may have no model: the fits of those that have."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import fields
 
 import numpy as np
 
+from vgyro import engine as engines
 from vgyro.config import Definition
-from vgyro.engine.models import ONE_GYRO, TOO_SHORT, DccFit, GarchFit
-from vgyro.volatility.dcc import Test, constant_correlation_test, fit_dcc
-from vgyro.volatility.garch import garch_from_parameters
+from vgyro.engine.models import ONE_GYRO, TOO_SHORT, DccWindows
+from vgyro.engine.status import dcc_code, garch_code
 from vgyro.volatility.series import window_residuals
 from vgyro.volatility.stretches import Window
 
 MIN_SAMPLES = 50
 """A stretch with fewer samples is not fitted at all."""
-
-
-@dataclass(frozen=True)
-class ArrayDcc:
-    """DCC of the gyros that have a GARCH model.
-
-    fit  : its target has all N gyros, NaN for those without a model; its correlation only those with one
-    test : constant-correlation test of the same standardised residuals
-    """
-
-    fit: DccFit
-    test: Test
 
 
 def fitted_residuals(
@@ -44,37 +32,54 @@ def fitted_residuals(
     return np.where(stuck, 0.0, r)
 
 
-def fit_array_dcc(
+def fit_array_dcc_windows(
     r: np.ndarray,
     omega: np.ndarray,
     alpha: np.ndarray,
     beta: np.ndarray,
     status: np.ndarray,
-    engine: str = "reference",
+    engine: str = "native",
     lags: int = 1,
-) -> ArrayDcc:
-    """Fit DCC(1,1) to the gyros that have a GARCH model, and test for constant correlation.
+) -> DccWindows:
+    """In each of K windows: DCC(1,1) of the gyros that have a GARCH model, and the test of constant correlation.
 
-    r : [T, N] deg/s, of `fitted_residuals`;  omega (deg/s)², alpha, beta, status : [N], NaN for a gyro without a model
-    lags : of the test
+    r                  : [K, T, N] deg/s, of `fitted_residuals`
+    omega, alpha, beta : [K, N], ω in (deg/s)², NaN for a gyro without a model
+    status             : [K, N] uint8, codes of the GARCH fits (GARCH_STATUSES)
+    engine, lags       : name of the engine; lags of the test
+    returns            : DccWindows; its target is NaN in the rows and columns of a gyro without a model. Of one gyro
+                         there is no correlation: a, b NaN, status `one gyro`; likewise of none, or `too short` where
+                         that is why
     """
-    n = r.shape[1]
-    gyros = np.isfinite(omega)
-    target = np.full((n, n), np.nan)
-    if not gyros.any():
-        short = len(status) > 0 and bool(np.all(status == TOO_SHORT))
-        return ArrayDcc(_no_fit(target, TOO_SHORT if short else ONE_GYRO), Test(np.nan, lags + 1, np.nan, np.nan))
-    e = r[:, gyros]
-    margins: GarchFit = garch_from_parameters(e, omega[gyros], alpha[gyros], beta[gyros], status[gyros])
-    z = e / np.sqrt(margins.variance)
-    fit = fit_dcc(z, engine, r=e, margins=margins)
-    target[np.ix_(gyros, gyros)] = fit.target
-    if fit.status == ONE_GYRO:
-        fit = replace(fit, a=np.nan, b=np.nan, log_likelihood=np.nan, log_likelihood_ccc=np.nan)
-    return ArrayDcc(replace(fit, target=target), constant_correlation_test(z, lags))
+    count, _, n = r.shape
+    status = np.asarray(status)
+    found = _nothing(count, n)
+    short = (status == garch_code(TOO_SHORT)).all(axis=1)
+    found.status[:] = np.where(short, dcc_code(TOO_SHORT), dcc_code(ONE_GYRO))
+    present = np.isfinite(omega)
+    sets, place = np.unique(present, axis=0, return_inverse=True)
+    for number, gyros in enumerate(sets):
+        chosen, used = np.flatnonzero(place.ravel() == number), np.flatnonzero(gyros)
+        if len(used) == 1:
+            found.target[chosen, used, used] = 1.0
+        if len(used) < 2:
+            continue
+        some = np.ix_(chosen, used)
+        fit = engines.get(engine).dcc.fit_dcc_windows(
+            # A copy of what the engine needs, and only where some gyro or window is left out.
+            r if present.all() else r[chosen][:, :, used],
+            omega[some], alpha[some], beta[some], status[some], lags,
+        )  # fmt: skip
+        found.target[np.ix_(chosen, used, used)] = fit.target
+        for field in fields(DccWindows):
+            if field.name != "target":
+                getattr(found, field.name)[chosen] = getattr(fit, field.name)
+    return found
 
 
-def _no_fit(target: np.ndarray, status: str) -> DccFit:
-    nothing = np.full(2, np.nan)
-    empty = np.empty((0, 0, 0))
-    return DccFit(np.nan, np.nan, nothing, nothing, target, np.nan, np.nan, empty, status)
+def _nothing(count: int, n: int) -> DccWindows:
+    def nan(*shape: int) -> np.ndarray:
+        return np.full((count, *shape), np.nan)
+
+    status = np.zeros(count, dtype=np.uint8)
+    return DccWindows(nan(), nan(), nan(2), nan(2), nan(n, n), nan(), nan(), nan(), status)

@@ -90,6 +90,8 @@ def _fit(series: np.ndarray, margins: np.ndarray | None, margin_codes: np.ndarra
     state = np.zeros(count, dtype=np.uint8)
     if n < 2 or samples < max(MIN_SAMPLES, n + 2):
         codes = np.full(count, dcc_code(ONE_GYRO if n < 2 else TOO_SHORT), dtype=np.uint8)
+    elif count == 0:
+        codes = state
     else:
         windows = _dcc.Windows(series, margins)
         rules = {"persistence_max": PERSISTENCE_MAX, "eigenvalue_min": EIGENVALUE_MIN, "gain": GAIN, "lags": lags}

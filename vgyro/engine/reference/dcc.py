@@ -12,17 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.engine.constant import (
+    constant_correlation_statistic,
+    constant_fit,
+    fit_ccc,
+    singular,
+)
 from vgyro.engine.models import (
-    BOUNDARY,
     BOUNDARY_MARGIN,
     CONVERGED,
-    EIGENVALUE_MIN,
+    DCC_STATUSES,
     FAILED,
+    GARCH_STATUSES,
     NOT_POSITIVE_DEFINITE,
     ONE_GYRO,
     PERSISTENCE_MAX,
     TOO_SHORT,
     DccFit,
+    DccWindows,
     GarchFit,
 )
 from vgyro.engine.recursions import (
@@ -32,16 +39,45 @@ from vgyro.engine.recursions import (
     dcc_score,
     garch_variance,
 )
+from vgyro.engine.status import GAIN, MIN_SAMPLES, dcc_code, dcc_status_codes, garch_code
 
-MIN_SAMPLES = 20
-ZERO = 1e-6
-"""a or b below this is 0."""
-A_NEAR_ZERO = 1e-3
-"""a below this has no usable standard error: b is all but unidentified."""
-STARTS = ((0.02, 0.95), (0.05, 0.90), (0.10, 0.80))
-LARGEST = 0.999
+__all__ = ["fit_by_pymgarch", "fit_ccc", "fit_dcc", "fit_dcc_windows"]
+
+STARTS = ((0.02, 0.95), (0.05, 0.90), (0.10, 0.80), (0.15, 0.40), (0.10, 0.05))
 INFEASIBLE = 1e10
 HESSIAN_STEP = 1e-4
+
+
+def fit_dcc_windows(
+    r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray, lags: int = 1
+) -> DccWindows:
+    """Fit DCC(1,1) to each of K windows: `fit_dcc` in a loop. See vgyro.engine.native.dcc.fit_dcc_windows."""
+    fits, statistics = [], []
+    for window, *parameters, codes in zip(r, omega, alpha, beta, status, strict=True):
+        window = np.ascontiguousarray(window, dtype=float)
+        variance = garch_variance(window, *parameters)
+        z = window / np.sqrt(variance)
+        nothing = np.full(window.shape[1], np.nan)
+        names = np.array(GARCH_STATUSES, dtype=object)[codes]
+        margins = GarchFit(*parameters, nothing, nothing, variance, names)
+        fits.append(fit_dcc(z, window, margins))
+        statistics.append(constant_correlation_statistic(z, lags))
+    n = r.shape[2]
+
+    def stacked(name: str, *shape: int) -> np.ndarray:
+        return np.array([getattr(fit, name) for fit in fits], dtype=float).reshape(-1, *shape)
+
+    return DccWindows(
+        a=stacked("a"),
+        b=stacked("b"),
+        stderr=stacked("stderr", 2),
+        stderr_hessian=stacked("stderr_hessian", 2),
+        target=stacked("target", n, n),
+        log_likelihood=stacked("log_likelihood"),
+        log_likelihood_ccc=stacked("log_likelihood_ccc"),
+        statistic=np.array(statistics, dtype=float),
+        status=np.array([dcc_code(fit.status) for fit in fits], dtype=np.uint8),
+    )
 
 
 def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None = None) -> DccFit:
@@ -50,27 +86,25 @@ def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None
     z = np.ascontiguousarray(z, dtype=float)
     samples, n = z.shape
     if n < 2:
-        return _without_dynamics(z, np.eye(n), ONE_GYRO)
-    if not np.all(np.isfinite(z)):
-        return _without_dynamics(z, np.eye(n), FAILED)
+        return constant_fit(z, np.eye(n), ONE_GYRO)
     if samples < max(MIN_SAMPLES, n + 2):
-        return _without_dynamics(z, np.eye(n), TOO_SHORT)
+        return constant_fit(z, np.eye(n), TOO_SHORT)
+    if not np.all(np.isfinite(z)):
+        return constant_fit(z, np.eye(n), FAILED)
     target = correlation_target(z)
-    if np.linalg.eigvalsh(target)[0] < EIGENVALUE_MIN:
-        return _without_dynamics(z, np.eye(n), NOT_POSITIVE_DEFINITE)
+    if singular(target):
+        return constant_fit(z, np.eye(n), NOT_POSITIVE_DEFINITE)
+    names = np.full(n, CONVERGED) if margins is None else margins.status
+    codes = np.array([[garch_code(name) for name in names]])
     a, b, ended_well = _maximise(z, target)
-    if a <= ZERO:
-        return _without_dynamics(z, target, BOUNDARY if ended_well else FAILED)
-    nothing = np.full(2, np.nan)
-    hessian, robust, status = nothing, nothing, BOUNDARY if ended_well else FAILED
-    if ended_well and a >= A_NEAR_ZERO and b > ZERO and a + b < PERSISTENCE_MAX - ZERO:
-        status = CONVERGED
+    status = DCC_STATUSES[dcc_status_codes(np.array([a]), np.array([b]), codes)[0]] if ended_well else FAILED
+    if a == 0:
+        return constant_fit(z, target, status)
+    hessian, robust = np.full((2, 2), np.nan)
+    if status in (CONVERGED, BOUNDARY_MARGIN):
         hessian = _hessian_stderr(z, a, b, target)
-        if margins is not None and r is not None:
-            if np.all(margins.status == CONVERGED):
-                robust = _two_step_stderr(np.asarray(r, dtype=float), margins, z, a, b, target)
-            else:
-                status = BOUNDARY_MARGIN
+    if status == CONVERGED and margins is not None and r is not None:
+        robust = _two_step_stderr(np.asarray(r, dtype=float), margins, z, a, b, target)
     return DccFit(
         a=a,
         b=b,
@@ -84,36 +118,8 @@ def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None
     )
 
 
-def fit_ccc(z: np.ndarray) -> DccFit:
-    """Constant conditional correlation: DCC with a = b = 0, nothing to optimise."""
-    z = np.ascontiguousarray(z, dtype=float)
-    n = z.shape[1]
-    if n < 2:
-        return _without_dynamics(z, np.eye(n), ONE_GYRO)
-    if not np.all(np.isfinite(z)):
-        return _without_dynamics(z, np.eye(n), FAILED)
-    target = correlation_target(z)
-    singular = np.linalg.eigvalsh(target)[0] < EIGENVALUE_MIN
-    return _without_dynamics(z, np.eye(n) if singular else target, NOT_POSITIVE_DEFINITE if singular else CONVERGED)
-
-
-def _without_dynamics(z: np.ndarray, target: np.ndarray, status: str) -> DccFit:
-    value = float(dcc_log_likelihood(z, 0.0, 0.0, target).sum()) if np.all(np.isfinite(z)) else np.nan
-    return DccFit(
-        a=0.0,
-        b=0.0,
-        stderr=np.full(2, np.nan),
-        stderr_hessian=np.full(2, np.nan),
-        target=target,
-        log_likelihood=value,
-        log_likelihood_ccc=value,
-        correlation=np.broadcast_to(target, (len(z), *target.shape)).copy(),
-        status=status,
-    )
-
-
 def _maximise(z: np.ndarray, target: np.ndarray) -> tuple[float, float, bool]:
-    """Best (a, b) over three starts and a = b = 0; and whether the optimiser ended well."""
+    """Best (a, b) over the starts, (0, 0) where it gains next to nothing; and whether the optimiser ended well."""
     from scipy.optimize import minimize
 
     def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
@@ -128,7 +134,8 @@ def _maximise(z: np.ndarray, target: np.ndarray) -> tuple[float, float, bool]:
         "fun": lambda x: PERSISTENCE_MAX - x[0] - x[1],
         "jac": lambda _: np.array([-1.0, -1.0]),
     }
-    best, best_cost = (0.0, 0.0), -float(dcc_log_likelihood(z, 0.0, 0.0, target).sum())
+    constant = -float(dcc_log_likelihood(z, 0.0, 0.0, target).sum())
+    best, best_cost = (0.0, 0.0), constant
     ended_well = False
     for start in STARTS:
         with warnings.catch_warnings():
@@ -138,15 +145,17 @@ def _maximise(z: np.ndarray, target: np.ndarray) -> tuple[float, float, bool]:
                 start,
                 jac=True,
                 method="SLSQP",
-                bounds=[(0.0, LARGEST)] * 2,
+                bounds=[(0.0, PERSISTENCE_MAX)] * 2,
                 constraints=[stationary],
                 options={"maxiter": 300, "ftol": 1e-9},
             )
         # 8: no step improves the likelihood any more, which at this tolerance is the optimum to rounding.
         good = result.status in (0, 8)
         ended_well = ended_well or good
-        if good and result.x[0] > ZERO and result.fun < best_cost:
-            best, best_cost = (float(result.x[0]), max(float(result.x[1]), 0.0)), float(result.fun)
+        if good and result.fun < best_cost:
+            best, best_cost = (max(float(result.x[0]), 0.0), max(float(result.x[1]), 0.0)), float(result.fun)
+    if constant - best_cost < GAIN * len(z):
+        return 0.0, 0.0, ended_well
     return best[0], min(best[1], PERSISTENCE_MAX - best[0]), ended_well
 
 

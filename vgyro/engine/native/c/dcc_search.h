@@ -113,10 +113,10 @@ VG_NOINLINE double VG(dcc_climb)(const dcc_window *w, double max, double *x) {
 /* The best a for a fixed b, and L_c / T there, from L_c at a = 0 and at two other places: a parabola's, which is kept
    away from 0 and from a + b = 1. */
 VG_INLINE double VG(dcc_profile)(const dcc_window *w, double constant, double b, double *a) {
-    const double high = fmin(0.6 * (1 - b), 0.25), low = 0.4 * high;
+    const double high = fmin(0.6 * (1 - b), 0.25), low = 0.15 * high;
     const double at_low = VG(dcc_value)(w, low, b), at_high = VG(dcc_value)(w, high, b);
-    if (!isfinite(at_low)) return -INFINITY;
     *a = low;
+    if (!isfinite(at_low)) return -INFINITY;
     if (!isfinite(at_high)) return at_low;
     const double rise = (at_low - constant) / low, bend = ((at_high - constant) / high - rise) / (high - low);
     if (bend < 0) *a = fmin(fmax(0.5 * (low - rise / bend), 0.1 * low), 0.95 * (1 - b));
@@ -124,19 +124,24 @@ VG_INLINE double VG(dcc_profile)(const dcc_window *w, double constant, double b,
     return constant + *a * (rise + (*a - low) * bend);
 }
 
-/* The likelihood's profile in b on a small stateless grid; from each of its peaks a climb. */
+VG_INLINE void VG(dcc_try)(const dcc_window *w, double max, double a, double b, double *best, double *optimum) {
+    double x[2] = {a, b}, value = VG(dcc_climb)(w, max, x);
+    if (value > *best) *best = value, memcpy(optimum, x, sizeof(x));
+}
+
+/* A small stateless grid: climbs from the peaks of the profile in b, and from the edge a + b = 1 where it is higher. */
 VG_NOINLINE void VG(dcc_maximise)(const dcc_window *w, const dcc_rules *rules, double *values) {
-    static const double grid[] = {0, 0.3, 0.55, 0.75, 0.87, 0.94, 0.975, 0.99};
-    enum { POINTS = sizeof(grid) / sizeof(grid[0]) };
-    const double constant = VG(dcc_value)(w, 0, 0);
-    double best = constant, optimum[2] = {0, 0}, start[POINTS], profile[POINTS + 2];
+    static const double grid[] = {0, 0.12, 0.3, 0.55, 0.75, 0.87, 0.94, 0.975, 0.99, 0.997}, edge[] = {0.005, 0.015, 0.05};
+    enum { POINTS = sizeof(grid) / sizeof(grid[0]), EDGES = sizeof(edge) / sizeof(edge[0]) };
+    const double constant = VG(dcc_value)(w, 0, 0), max = rules->persistence_max;
+    double best = constant, optimum[2] = {0, 0}, a[POINTS], profile[POINTS + 2];
     profile[0] = profile[POINTS + 1] = -INFINITY;
-    for (int k = 0; k < POINTS; k++) profile[k + 1] = VG(dcc_profile)(w, constant, grid[k], &start[k]);
-    for (int k = 0; k < POINTS; k++) {
-        if (!(profile[k + 1] > profile[k] && profile[k + 1] >= profile[k + 2])) continue;
-        double x[2] = {start[k], grid[k]}, value = VG(dcc_climb)(w, rules->persistence_max, x);
-        if (value > best) best = value, memcpy(optimum, x, sizeof(optimum));
-    }
+    for (int k = 0; k < POINTS; k++) profile[k + 1] = VG(dcc_profile)(w, constant, grid[k], &a[k]);
+    for (int k = 0; k < POINTS; k++)
+        if (profile[k + 1] > profile[k] && profile[k + 1] >= profile[k + 2])
+            VG(dcc_try)(w, max, a[k], grid[k], &best, optimum);
+    for (int k = 0; k < EDGES; k++)
+        if (VG(dcc_value)(w, edge[k], max - edge[k]) > best) VG(dcc_try)(w, max, edge[k], max - edge[k], &best, optimum);
     const int moves = best - constant >= rules->gain;
     values[DCC_A] = moves ? optimum[0] : 0;
     values[DCC_B] = moves ? optimum[1] : 0;
