@@ -1,7 +1,7 @@
 # vgyro: from the dumps in raw/ to the pages in reports/.   snakemake --cores 2   |   snakemake --cores 2 papers
 #
 # Each data set is raw/<dataset>/dataset.yaml. The stages, one file each in workflow/rules/:
-#   decode → screen → calibrate → convert → noise → volatility (garch, dcc, arch_lm, weights) → fuse → measure
+#   decode → screen → calibrate → convert → noise → series → volatility (in chunks) → fuse → measure
 #   → crosscheck → report → verdict;   simulate → papers regenerates the tables of the two papers.
 
 from snakemake.utils import min_version
@@ -21,6 +21,7 @@ wildcard_constraints:
     recording="[A-Za-z0-9][A-Za-z0-9_-]*",
     axis="[A-Za-z0-9_]+",
     definition="level|demeaned|difference|residual",
+    chunk=r"\d+-of-\d+",
     paper="|".join(PAPERS),
 
 

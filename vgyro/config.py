@@ -112,12 +112,19 @@ class Analysis(StrictModel):
     crosscheck: CrossCheckOptions = CrossCheckOptions()
 
 
+class WorkflowOptions(StrictModel):
+    """How the work is cut into jobs. The results do not depend on it."""
+
+    chunk_windows: int = Field(20000, ge=1, description="rolling windows a job; a longer recording takes several jobs")
+
+
 class Config(StrictModel):
     """config/config.yaml"""
 
     datasets: tuple[str, ...] | Literal["auto"] = Field(
         "auto", description="names of folders in raw/; auto: all of them"
     )
+    workflow: WorkflowOptions = WorkflowOptions()
     analysis: Analysis = Analysis()
 
 

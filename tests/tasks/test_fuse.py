@@ -1,4 +1,4 @@
-"""The tasks weights → fuse → crosscheck on a small array, through files."""
+"""The tasks volatility → fuse → crosscheck on a small array, through files."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 
 from vgyro.engine.independent import nnls_weights
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
-from vgyro.tasks import crosscheck, dcc, fuse, garch, weights
+from vgyro.tasks import crosscheck, fuse, series, volatility
 from vgyro.tasks.common import Task
 
 GYROS = ("g1", "g2", "g3")
@@ -15,6 +15,7 @@ RATE_HZ, SECONDS = 10.0, 400
 DEFINITIONS = ("level", "residual")
 ARW = (0.05, 0.05, 0.15)
 ANALYSIS = {
+    "engine": "reference",
     "volatility": {"window": 120, "step": 40, "definitions": DEFINITIONS},
     "fusion": {"moment_window_s": 60},
     "crosscheck": {"windows": 2},
@@ -61,13 +62,11 @@ def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True):
 
 
 def run_volatility(folder):
+    series.main(task_of(folder, {"rates": ["rates.parquet"]}, {"series": "series.parquet"}))
     for definition in DEFINITIONS:
-        rates, name = {"rates": ["rates.parquet"]}, {"definition": definition}
-        garch.main(task_of(folder, rates, {"garch": f"{definition}/garch.parquet"}, **name))
-        inputs = {**rates, "garch": [f"{definition}/garch.parquet"]}
-        dcc.main(task_of(folder, inputs, {"dcc": f"{definition}/dcc.parquet"}, **name))
-        inputs["dcc"] = [f"{definition}/dcc.parquet"]
-        weights.main(task_of(folder, inputs, {"weights": f"{definition}/weights.parquet"}, **name))
+        made = {name: f"{definition}/{name}.parquet" for name in ("garch", "dcc", "arch_lm", "weights", "fits")}
+        (folder / definition).mkdir(exist_ok=True)
+        volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, definition=definition))
 
 
 def fuse_in(folder, tables=(), **keywords):
@@ -155,7 +154,8 @@ def test_motion_takes_the_wider_filter_and_warns(tmp_path):
 def check_in(folder):
     tables = {name: [f"{d}/{name}.parquet" for d in DEFINITIONS] for name in ("garch", "dcc", "weights")}
     inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "fused": ["fused.parquet"],
-              "methods": ["methods.parquet"], "allan": ["allan.parquet"], **tables}  # fmt: skip
+              "methods": ["methods.parquet"], "allan": ["allan.parquet"], "series": ["series.parquet"],
+              **tables}  # fmt: skip
     crosscheck.main(task_of(folder, inputs, {"crosscheck": "crosscheck.parquet"}))
     return read_columns(folder / "crosscheck.parquet")
 

@@ -1,4 +1,4 @@
-"""The volatility tasks end to end: rates in, four tables out."""
+"""The volatility tasks end to end: rates in, five tables out, whatever the number of jobs."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,10 @@ import pytest
 from vgyro.board import Board
 from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_table
-from vgyro.tasks import arch_lm, dcc, garch, weights
+from vgyro.tasks import series, volatility, volatility_chunk
 from vgyro.tasks.common import Task
-from vgyro.volatility import fit_garch
+from vgyro.tasks.volatility_series import WHOLE, open_series, stored_model
+from vgyro.volatility import Window, fit_garch, windows
 
 WINDOW, STEP = 120, 50
 
@@ -25,8 +26,12 @@ def board_of(names):
     return Board.model_validate(record).model_dump(mode="json")
 
 
-def run_all(folder, values, segment=None, rest=None, definition="level", kind="static"):
-    """Write rates at 10 Hz whose 1 Hz block means are `values`, run the four tasks, read their tables."""
+TABLES = ("garch", "dcc", "arch_lm", "weights", "fits")
+PARTS = ("garch", "dcc", "weights")
+
+
+def write_series(folder, values, segment=None, rest=None, definition="level", kind="static", **analysis):
+    """Write rates at 10 Hz whose 1 Hz block means are `values`, and the series of them; return the options."""
     samples, n = values.shape
     names = [f"g{i + 1}" for i in range(n)]
     rates = np.repeat(values, 10, axis=0)
@@ -42,18 +47,29 @@ def run_all(folder, values, segment=None, rest=None, definition="level", kind="s
         "axis": "z",
         "definition": definition,
         "kind": kind,
-        "analysis": {"engine": "reference", "volatility": {"window": WINDOW, "step": STEP}},
+        "analysis": {"engine": "reference", "volatility": {"window": WINDOW, "step": STEP, **analysis}},
     }
-    needs = {
-        "garch": ["rates"],
-        "dcc": ["rates", "garch"],
-        "arch_lm": ["rates", "garch"],
-        "weights": ["rates", "garch", "dcc"],
-    }
-    for task, module in (("garch", garch), ("dcc", dcc), ("arch_lm", arch_lm), ("weights", weights)):
-        inputs = {name: [folder / f"{name}.parquet"] for name in needs[task]}
-        module.main(Task(inputs, {task: folder / f"{task}.parquet"}, options, "code"))
-    return {task: read_columns(folder / f"{task}.parquet") for task in needs}
+    made = Task({"rates": [folder / "rates.parquet"]}, {"series": folder / "series.parquet"}, options, "code")
+    series.main(made)
+    return options
+
+
+def run_volatility(folder, options, chunks=1):
+    """Run the task `volatility`, after `chunks` jobs that make the parts, or by itself; read the tables."""
+    known = {"series": [folder / "series.parquet"]}
+    parts = {name: [] for name in PARTS}
+    for chunk in range(1, chunks + 1) if chunks > 1 else ():
+        made = {name: folder / f"{name}.{chunk}.parquet" for name in PARTS}
+        volatility_chunk.main(Task(known, made, {**options, "chunk": f"{chunk}-of-{chunks}"}, "code"))
+        parts = {name: [*paths, made[name]] for name, paths in parts.items()}
+    outputs = {name: folder / f"{name}.parquet" for name in TABLES}
+    volatility.main(Task({**known, **parts}, outputs, options, "code"))
+    return {name: read_columns(path) for name, path in outputs.items()}
+
+
+def run_all(folder, values, **keywords):
+    """The series of `values`, and what the stage makes of it."""
+    return run_volatility(folder, write_series(folder, values, **keywords))
 
 
 def noise(samples, n, seed=0):
@@ -86,7 +102,8 @@ def test_rows_of_every_table(tables):
 
 def test_columns_are_declared_with_units(tables):
     folder, found = tables
-    for name in found:
+    assert set(found) == set(TABLES)
+    for name in [*found, "series"]:
         about = read_metadata(folder / f"{name}.parquet")
         assert about["schema"] == name
         assert about["version"] == SCHEMAS[name].version
@@ -97,7 +114,7 @@ def test_parameters_are_those_of_the_window(tables):
     # Expected: the public function on the window cut out by hand.
     _, found = tables
     window = noise(300, 3)[50:170]
-    fit = fit_garch(window - window.mean(axis=0))
+    fit = fit_garch(window - window.mean(axis=0), "reference")
     rows = found["garch"]["window"] == 1
     np.testing.assert_allclose(found["garch"]["omega"][rows], fit.omega, rtol=1e-5)
     assert found["garch"]["status"][rows].tolist() == fit.status.tolist()
@@ -121,8 +138,103 @@ def test_weights_are_weights(tables):
 def test_same_bytes_again(tables, tmp_path):
     folder, _ = tables
     run_all(tmp_path, noise(300, 3), definition="demeaned")
-    for name in ("garch", "dcc", "arch_lm", "weights"):
+    for name in TABLES:
         assert (tmp_path / f"{name}.parquet").read_bytes() == (folder / f"{name}.parquet").read_bytes()
+
+
+def gappy():
+    """Stretches of 310, 60 (too short), 130 and 200 s; the third begins a window long, with little to carry forward."""
+    segment = np.repeat([0, 1, 2, 3], [310, 60, 130, 200])
+    values = noise(700, 3, seed=3)
+    values[340:365] += 5.0
+    values[420:520, 2] = 0.01
+    return values, segment
+
+
+@pytest.mark.parametrize("definition", ["difference", "residual"])
+def test_the_tables_do_not_depend_on_the_jobs(tmp_path, definition, monkeypatch):
+    # Windows: 4 (to 270 of 310), none, 1, 2. Seven windows in 1 job, 2, 3 and 9, the last of which have none.
+    values, segment = gappy()
+    options = write_series(tmp_path, values, segment=segment, definition=definition)
+    found = run_volatility(tmp_path, options)
+    assert found["dcc"]["start"].tolist() == [0, 0, 50, 100, 150, 370, 500, 550]
+    expected = {name: (tmp_path / f"{name}.parquet").read_bytes() for name in TABLES}
+    for chunks in (2, 3, 9):
+        run_volatility(tmp_path, options, chunks)
+        for name in TABLES:
+            assert (tmp_path / f"{name}.parquet").read_bytes() == expected[name], (chunks, name)
+    # Nor on how many windows are fitted at once, and how much of the series is read.
+    monkeypatch.setattr(volatility_chunk, "BATCH_WINDOWS", 2)
+    monkeypatch.setattr(volatility_chunk, "FAR", 100)
+    monkeypatch.setattr("vgyro.tasks.volatility_series.SLAB", 200)
+    run_volatility(tmp_path, options)
+    for name in TABLES:
+        assert (tmp_path / f"{name}.parquet").read_bytes() == expected[name], name
+
+
+def test_rows_of_a_recording_with_gaps(tmp_path):
+    values, segment = gappy()
+    found = run_all(tmp_path, values, segment=segment, models=["ccc"], modes=["causal"])
+    rows = found["weights"]
+    np.testing.assert_array_equal(rows["segment"], segment)
+    np.testing.assert_array_equal(rows["time"], np.arange(700))
+    # By hand: equal weights in the stretch that is too short, and before each first window is complete.
+    short = rows["status"] == "too short: 310 samples, window 120"
+    assert np.flatnonzero(short).tolist() == list(range(310, 370))
+    waiting = [*range(120), *range(370, 490), *range(500, 620)]
+    assert np.flatnonzero(rows["status"] == "no model yet").tolist() == waiting
+    np.testing.assert_array_equal(rows["w_g1"][short], 1 / 3)
+    assert np.isnan(rows["sigma"][short]).all()
+    # The third gyro sticks in the first 100 s of the window [370, 490), and that window's model is carried to 500.
+    assert set(rows["status"][490:500]) <= {"ok"}
+
+
+def test_weights_are_blocks_of_models_and_modes(tables):
+    folder, found = tables
+    about = read_metadata(folder / "weights.parquet")
+    assert about["blocks"] == [["dcc", "in_sample"], ["dcc", "causal"], ["ccc", "in_sample"], ["ccc", "causal"]]
+    assert about["samples"] == 300
+    for number, (model, mode) in enumerate(about["blocks"]):
+        rows = slice(300 * number, 300 * (number + 1))
+        assert set(found["weights"]["model"][rows]) == {model}
+        assert set(found["weights"]["mode"][rows]) == {mode}
+
+
+def test_the_map_of_fits_counts_every_window(tables):
+    _, found = tables
+    fits, rolling = found["fits"], found["garch"]["window"] != WHOLE
+    for gyro in ("g1", "g2", "g3"):
+        statuses = found["garch"]["status"][rolling & (found["garch"]["gyro"] == gyro)]
+        for status in set(statuses):
+            counted = fits["windows"][(fits["subject"] == gyro) & (fits["status"] == status)]
+            assert counted.sum() == (statuses == status).sum()
+    assert fits["windows"][fits["subject"] == "dcc"].sum() == 4
+    # By hand: four bins of 75 s; the middles of the windows, 59.5, 109.5, 159.5 and 209.5 s, lie in 0, 1, 2 and 2.
+    dcc = fits["subject"] == "dcc"
+    counts = [int(fits["windows"][dcc & (fits["time_start"] == start)].sum()) for start in (0.0, 75.0, 150.0, 225.0)]
+    assert counts == [1, 1, 2, 0]
+
+
+def test_a_stored_model_is_that_of_its_window(tables):
+    folder, found = tables
+    options = write_series(folder, noise(300, 3), definition="demeaned")
+    array = open_series(Task({"series": [folder / "series.parquet"]}, {}, options, "code"))
+    assert [array.plan.window(k) for k in range(4)] == windows(np.zeros(300), WINDOW, STEP)
+    assert array.window(WHOLE) == Window(0, 300)
+    model = stored_model(array, folder / "garch.parquet", folder / "dcc.parquet", 2)
+    rows = found["garch"]["window"] == 2
+    np.testing.assert_array_equal(model.omega[0], found["garch"]["omega"][rows])
+    assert model.start.tolist() == [100]
+    assert model.target[0, 2, 1] == found["dcc"]["target"][3][2]
+    window = noise(300, 3)[100:220]
+    np.testing.assert_allclose(array.residuals(2), window - window.mean(axis=0), atol=1e-12)
+
+
+def test_a_long_stretch_stands_for_itself_by_its_beginning(tmp_path, monkeypatch):
+    monkeypatch.setattr("vgyro.tasks.volatility_series.WHOLE_SAMPLES", 150)
+    found = run_all(tmp_path, noise(300, 2))
+    assert (found["dcc"]["start"][0], found["dcc"]["stop"][0]) == (0, 150)
+    assert set(found["arch_lm"]["samples"]) == {150}
 
 
 def test_too_short_for_a_window_but_not_for_a_fit(tmp_path):

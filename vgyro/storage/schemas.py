@@ -52,7 +52,7 @@ _ALL = (
         Column("temp_{temperature}", "°C", "temperature channel"),
         Column("{gyro}", "deg/s", "rate along the gyro's axis"),
     )),
-    Schema("series", 1, "the series that volatility is analysed in: means of blocks of samples, in pieces without a gap", (
+    Schema("series", 1, "the series in which volatility is analysed: means of blocks of samples", (
         Column("time", "s", "time of the block's first sample"),
         _SEGMENT,
         Column("stretch", "", "number of the run without a missing block, within which windows lie"),
@@ -103,7 +103,7 @@ _ALL = (
         Column("status", "", "as in garch and dcc"),
         Column("windows", "", "number of windows; none has no row"),
     )),
-    Schema("weights", 1, "weights of each model and mode, one row a sample of the volatility series", (
+    Schema("weights", 2, "weights of each model and mode, one row a sample of the volatility series", (
         _TIME, _SEGMENT,
         Column("model", "", "dcc or ccc"),
         Column("mode", "", "in_sample or causal"),

@@ -209,7 +209,7 @@ class RowStream:
 
     def take(self, count: int) -> pa.Table:
         """The next `count` rows, fewer at the end.  raises : ValueError if there is no table at all"""
-        while sum(table.num_rows for table in self._held) < count:
+        while not self._held or sum(table.num_rows for table in self._held) < count:
             table = next(self._tables, None)
             if table is None:
                 break

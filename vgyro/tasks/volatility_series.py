@@ -1,125 +1,139 @@
-"""What the volatility tasks share: the series of one array, its windows, and the parameters stored before."""
+"""What the volatility tasks share: where the series of one array and its windows are, and the models stored of them."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
-from typing import TypeVar, get_args
+from typing import get_args
 
 import numpy as np
 
 from vgyro.board import Board
 from vgyro.config import Definition, VolatilityOptions
+from vgyro.engine.models import DCC_STATUSES, GARCH_STATUSES, DccWindows, GarchWindows
 from vgyro.errors import ConfigError
-from vgyro.storage.tables import read_columns
+from vgyro.storage.tables import read_metadata, read_rows
 from vgyro.tasks.common import Task
-from vgyro.tasks.rates_file import read_array
-from vgyro.volatility.series import Series, block_means
-from vgyro.volatility.stretches import Window, longest_stretch, stretches, windows
-from vgyro.volatility.windowed import MIN_SAMPLES, fitted_residuals
+from vgyro.volatility.fits import WindowFits, window_models
+from vgyro.volatility.rolling import WindowModels
+from vgyro.volatility.stretches import RollingWindows, Window, rolling_windows
+from vgyro.volatility.windowed import fitted_residuals
 
 WHOLE = -1
 """Number of the window that is the longest stretch of the record."""
-IN_MOTION = ("constant", "random", "sinusoid")
-PROGRESS_STEPS = 20
-
-Item = TypeVar("Item")
+WHOLE_SAMPLES = 1_000_000
+"""Of a longer stretch, that window is the first so many samples."""
+SLAB = 1 << 20
 
 
 @dataclass(frozen=True)
 class ArraySeries:
-    """One array's series and how it is analysed. `jobs`: number and samples of each window, the whole record first."""
+    """One array's series, which stays in its file, and how it is analysed."""
 
+    path: Path
     gyros: list[str]
-    series: Series
+    rate_hz: float
+    plan: RollingWindows
     options: VolatilityOptions
     definition: Definition
     engine: str
-    jobs: list[tuple[int, Window]]
 
-    def residuals(self, window: Window) -> np.ndarray:
-        """r_t that the models of a window are fitted to, [T, N] deg/s."""
-        start = next(
-            (run.start for run in stretches(self.series.stretch) if run.start <= window.start < run.stop), window.start
-        )
-        return fitted_residuals(self.series.values, window, self.definition, self.options.residual_span, start)
+    @property
+    def samples(self) -> int:
+        """Samples of the series."""
+        return self.plan.samples
 
-    def place(self, number: int, window: Window) -> dict[str, object]:
-        """Columns that say where a window is; times are those of the first samples of its first and last block."""
-        time = self.series.time
-        first, last = (time[window.start], time[window.stop - 1]) if window.length else (np.nan, np.nan)
-        return {
-            "window": number,
-            "start": window.start,
-            "stop": window.stop,
-            "time_start": float(first),
-            "time_stop": float(last),
-        }
+    @property
+    def longest(self) -> Window:
+        """The longest stretch, the first of several; empty for an empty series."""
+        return max(self.plan.runs, key=lambda run: run.length, default=Window(0, 0))
+
+    @property
+    def whole(self) -> Window:
+        """Window WHOLE."""
+        longest = self.longest
+        return Window(longest.start, min(longest.stop, longest.start + WHOLE_SAMPLES))
 
     @property
     def too_short(self) -> str:
-        """Why there is no window."""
-        longest = longest_stretch(self.series.stretch).length
-        return f"too short: {longest} samples, window {self.options.window}"
+        """Why a stretch holds no window."""
+        return f"too short: {self.longest.length} samples, window {self.options.window}"
+
+    def window(self, number: int) -> Window:
+        """Samples of a window."""
+        return self.whole if number == WHOLE else self.plan.window(number)
+
+    def rows(self, start: int, stop: int) -> np.ndarray:
+        """Samples start to stop - 1, [stop - start, N] deg/s."""
+        return self.table(start, stop)[0]
+
+    def table(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """Samples start to stop - 1, [stop - start, N] deg/s, and their time [stop - start], s."""
+        found = read_rows(self.path, ["time", *self.gyros], start, stop)
+        return np.column_stack([found[gyro] for gyro in self.gyros]).astype(float, copy=False), found["time"]
+
+    def residuals(self, number: int) -> np.ndarray:
+        """r_t that the models of a window are fitted to, [T, N] deg/s."""
+        window = self.window(number)
+        begin = window.start if number == WHOLE else int(self.plan.stretch_start[number])
+        first = max(begin, window.start - 1)
+        here = Window(window.start - first, window.stop - first)
+        values = self.rows(first, window.stop)
+        return fitted_residuals(values, here, self.definition, self.options.residual_span, begin - first)
 
 
-def open_series(task: Task) -> ArraySeries:
-    """Read the rates of one array and make its series and windows.
+class Slab:
+    """The series read forward, many samples at a time; what windows that follow each other share is read once."""
 
-    Where the board is known to stand still at times, only those samples are used; a recording in motion is used whole.
+    def __init__(self, array: ArraySeries) -> None:
+        self._array, self._start = array, 0
+        self._values, self._time = np.empty((0, len(array.gyros))), np.empty(0)
+
+    def table(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """As ArraySeries.table."""
+        if start < self._start or stop > self._start + len(self._time):
+            until = min(max(stop, start + SLAB), self._array.samples)
+            self._start, (self._values, self._time) = start, self._array.table(start, until)
+        rows = slice(start - self._start, stop - self._start)
+        return self._values[rows], self._time[rows]
+
+
+def open_series(task: Task, name: str = "series") -> ArraySeries:
+    """Where the series of one array is, from the input `name`.
+
+    options : board, axis, definition, analysis.engine, analysis.volatility
+    raises  : ConfigError if the definition is not known
     """
     analysis = task.options["analysis"]
     options = VolatilityOptions.model_validate(analysis.get("volatility", {}))
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
-    rates = read_array(task.input("rates"), gyros, task.options["axis"])
-    rest = rates.at_rest
-    in_motion = task.options.get("kind") in IN_MOTION or not rest.any()
-    used = None if in_motion else rest
-    series = block_means(rates.rate, rates.rate_hz, options.rate_hz, rates.segment, used, rates.time)
-    found = windows(series.stretch, options.window, options.step)
-    jobs = [(WHOLE, longest_stretch(series.stretch)), *enumerate(found)]
-    logging.info(
-        "%d samples at %g Hz, %s, %d windows", len(series.values), series.rate_hz, _use(in_motion, rest), len(found)
-    )
-    return ArraySeries(gyros, series, options, _definition(task), analysis.get("engine", "reference"), jobs)
-
-
-def _use(in_motion: bool, rest: np.ndarray) -> str:
-    return "in motion, all of it used" if in_motion else f"{rest.mean():.1%} of the recording at rest and used"
-
-
-def _definition(task: Task) -> Definition:
     definition = task.options["definition"]
     if definition not in get_args(Definition):
         raise ConfigError(f"unknown definition {definition!r}", remedy=f"One of {', '.join(get_args(Definition))}")
-    return definition
+    path = task.input(name)
+    about = read_metadata(path)
+    plan = rolling_windows([Window(start, stop) for start, stop, _ in about["runs"]], options.window, options.step)
+    return ArraySeries(path, gyros, about["rate_hz"], plan, options, definition, analysis.get("engine", "native"))
 
 
-def enough(window: Window) -> bool:
-    """True if the window is long enough to be fitted."""
-    return window.length >= MIN_SAMPLES
-
-
-def with_progress(items: Sequence[Item]) -> Iterator[Item]:
-    """Pass the items on; log every 5 % how many are done, how many remain, how fast."""
-    every = max(1, len(items) // PROGRESS_STEPS)
-    begun = perf_counter()
-    for done, item in enumerate(items, start=1):
-        yield item
-        if done % every == 0 or done == len(items):
-            speed = done / max(perf_counter() - begun, 1e-9)
-            logging.info("window %d of %d, %d remain, %.1f a second", done, len(items), len(items) - done, speed)
-
-
-def stored_garch(path: Path, gyros: list[str]) -> dict[int, dict[str, np.ndarray]]:
-    """garch.parquet as window → column → array [N] in the order of the gyros."""
-    table = read_columns(path, ["window", "gyro", "omega", "alpha", "beta", "status"])
-    found: dict[int, dict[str, np.ndarray]] = {}
-    for number in np.unique(table["window"]):
-        rows = np.flatnonzero(table["window"] == number)
-        order = rows[[int(np.flatnonzero(table["gyro"][rows] == gyro)[0]) for gyro in gyros]]
-        found[int(number)] = {name: table[name][order] for name in ("omega", "alpha", "beta", "status")}
-    return found
+def stored_model(array: ArraySeries, garch_path: Path, dcc_path: Path, number: int) -> WindowModels:
+    """The model of one window, as garch.parquet and dcc.parquet hold it."""
+    n, row = len(array.gyros), number + 1
+    names = ["window", "omega", "alpha", "beta", "status"]
+    garch = read_rows(garch_path, names, row * n, (row + 1) * n)
+    dcc = read_rows(dcc_path, ["window", "a", "b", "target", "status"], row, row + 1)
+    if not np.all(garch["window"] == number) or dcc["window"][0] != number:
+        raise ValueError(f"window {number} is not where it should be in {garch_path} and {dcc_path}")
+    target = np.eye(n)
+    target[np.triu_indices(n, 1)] = dcc["target"][0]
+    target = np.triu(target) + np.triu(target, 1).T
+    omega, alpha, beta = (garch[name][None] for name in ("omega", "alpha", "beta"))
+    status = np.array([[GARCH_STATUSES.index(name) for name in garch["status"]]], dtype=np.uint8)
+    found = np.array([DCC_STATUSES.index(dcc["status"][0])], dtype=np.uint8)
+    nan, pair = np.full(1, np.nan), np.full((1, 2), np.nan)
+    fits = WindowFits(
+        GarchWindows(omega, alpha, beta, np.full((1, n, 3), np.nan), np.full((1, n), np.nan), status),
+        DccWindows(dcc["a"], dcc["b"], pair, pair, target[None], nan, nan, nan, found),
+    )
+    window = array.window(number)
+    return window_models(fits, np.array([window.start]), window.length, array.gyros)

@@ -44,6 +44,7 @@ class RollingWindows:
 
     runs  : all stretches of the series, in order
     start : [K] first sample of each window;  run : [K] number of the stretch it lies in
+    stretch_start, stretch_stop : [K] first sample of that stretch, and one past its last
     """
 
     runs: tuple[Window, ...]
@@ -51,14 +52,11 @@ class RollingWindows:
     step: int
     start: np.ndarray
     run: np.ndarray
+    stretch_start: np.ndarray
+    stretch_stop: np.ndarray
 
     def __len__(self) -> int:
         return len(self.start)
-
-    @property
-    def stretch_start(self) -> np.ndarray:
-        """First sample of each window's stretch, [K]."""
-        return np.array([run.start for run in self.runs], dtype=np.int64)[self.run]
 
     @property
     def samples(self) -> int:
@@ -73,11 +71,12 @@ class RollingWindows:
 
 def rolling_windows(runs: Sequence[Window], length: int, step: int) -> RollingWindows:
     """The rolling windows of a series whose stretches are `runs`."""
-    counts = np.array([max(0, (run.length - length) // step + 1) for run in runs], dtype=np.int64)
-    number = np.repeat(np.arange(len(runs)), counts)
+    edges = np.array(runs, dtype=np.int64).reshape(-1, 2)
+    counts = np.maximum(0, (edges[:, 1] - edges[:, 0] - length) // step + 1)
+    number = np.repeat(np.arange(len(edges)), counts)
     within = np.arange(len(number)) - (np.cumsum(counts) - counts)[number]
-    first = np.array([run.start for run in runs], dtype=np.int64)
-    return RollingWindows(tuple(runs), length, step, first[number] + step * within, number)
+    first, last = edges[number].T
+    return RollingWindows(tuple(runs), length, step, first + step * within, number, first, last)
 
 
 def windows(segment: np.ndarray, window: int, step: int) -> list[Window]:

@@ -1,6 +1,7 @@
 """What the rules share: the data sets, the options each stage uses, and where files are."""
 
 import json
+import math
 import shlex
 import sys
 from pathlib import Path
@@ -16,7 +17,9 @@ from vgyro.tasks.twins import load_twins
 PAPERS = ("jiang2012", "liu2015")
 
 # One thread a job: Snakemake places the jobs on the cores, and one thread gives the same bytes everywhere.
-shell.prefix("export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1; ")
+shell.prefix(
+    "export VGYRO_THREADS=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1; "
+)
 
 LOADED = load_datasets("config/config.yaml", "raw", "config/boards")
 TWINS = load_twins(PAPERS, "config/twins", "results/twins", "config/boards")
@@ -124,12 +127,45 @@ def usable(dataset):
 
 def has_volatility(dataset, recording):
     """True if the recording can hold a rolling window; a free one may, and finds out."""
-    chosen = analysis_of(dataset).volatility
     if kind_of(dataset, recording) in (*AT_REST, "free"):
         return True
+    return series_length(dataset, recording) >= analysis_of(dataset).volatility.window
+
+
+def series_length(dataset, recording):
+    """Samples that the volatility series of a recording has, if nothing is lost and all of it is used."""
+    chosen = analysis_of(dataset).volatility
     about = screened(dataset)["recordings"][recording]
     rate = about["rate_hz"] if chosen.rate_hz == "full" else chosen.rate_hz
-    return about["duration_s"] * rate >= chosen.window
+    return about["duration_s"] * rate
+
+
+def volatility_parts(table):
+    """Parts of a volatility table; none for a recording whose windows are few enough for one job."""
+
+    def parts(wildcards):
+        samples = series_length(wildcards.dataset, wildcards.recording)
+        windows = samples / analysis_of(wildcards.dataset).volatility.step
+        chunks = math.ceil(windows / LOADED.config.workflow.chunk_windows)
+        folder = "results/{dataset}/{recording}/{axis}/{definition}"
+        return [
+            f"{folder}/{table}.{chunk}-of-{chunks}.parquet"
+            for chunk in range(1, chunks + 1)
+            if chunks > 1
+        ]
+
+    return parts
+
+
+garch_parts = volatility_parts("garch")
+dcc_parts = volatility_parts("dcc")
+weights_parts = volatility_parts("weights")
+
+
+def series_of(wildcards):
+    """Volatility series, for a recording that can hold a window."""
+    path = f"results/{wildcards.dataset}/{wildcards.recording}/{wildcards.axis}/series.parquet"
+    return [path] if has_volatility(wildcards.dataset, wildcards.recording) else []
 
 
 def definitions(dataset):
@@ -247,7 +283,7 @@ def artefacts_of(wildcards):
             )
             paths += [f"{folder}/{table}.parquet" for table in tables]
             if has_volatility(dataset, recording):
-                parts = ("arch_lm", "garch", "dcc", "weights")
+                parts = ("arch_lm", "garch", "dcc", "weights", "fits")
                 paths += [
                     f"{folder}/{name}/{part}.parquet"
                     for name in definitions(dataset)

@@ -33,6 +33,7 @@ rule crosscheck:
         fused="results/{dataset}/{recording}/{axis}/fused.parquet",
         methods="results/{dataset}/{recording}/{axis}/methods.parquet",
         allan="results/{dataset}/{recording}/{axis}/allan.parquet",
+        series=series_of,
         garch=garch_of,
         dcc=dcc_of,
         weights=weights_of,
@@ -51,6 +52,6 @@ rule crosscheck:
         ),
         code=code("crosscheck"),
     shell:
-        "python -m vgyro.tasks.crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
+        "python -m vgyro.tasks.crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input series {input.series:q} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
         " --output crosscheck {output.crosscheck}"
         " --options {params.options:q} --code {params.code} --log {log}"

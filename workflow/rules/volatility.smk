@@ -1,24 +1,80 @@
-rule volatility:
-    """GARCH, DCC, ARCH-LM and minimum-variance weights of one array, in rolling windows, for one definition of r_t."""
+rule series:
+    """The volatility series of one array: means of blocks of samples, for all definitions of r_t."""
     input:
         rates="results/{dataset}/{recording}/rates.parquet",
+    output:
+        series="results/{dataset}/{recording}/{axis}/series.parquet",
+    log:
+        "results/logs/{dataset}/{recording}/{axis}/series.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/{axis}/series.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=20,
+    params:
+        options=stage("board", "volatility"),
+        code=code("series"),
+    shell:
+        "python -m vgyro.tasks.series --input rates {input.rates} --output series {output.series}"
+        " --options {params.options:q} --code {params.code} --log {log}"
+
+
+rule volatility_chunk:
+    """GARCH, DCC and minimum-variance weights of some of the rolling windows, for one definition of r_t."""
+    input:
+        series="results/{dataset}/{recording}/{axis}/series.parquet",
+    output:
+        garch=temp(
+            "results/{dataset}/{recording}/{axis}/{definition}/garch.{chunk}.parquet"
+        ),
+        dcc=temp(
+            "results/{dataset}/{recording}/{axis}/{definition}/dcc.{chunk}.parquet"
+        ),
+        weights=temp(
+            "results/{dataset}/{recording}/{axis}/{definition}/weights.{chunk}.parquet"
+        ),
+    log:
+        "results/logs/{dataset}/{recording}/{axis}/{definition}/volatility.{chunk}.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/{axis}/{definition}/volatility.{chunk}.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=480,
+    params:
+        options=stage("board", "engine", "volatility"),
+        code=code("volatility_chunk"),
+    shell:
+        "python -m vgyro.tasks.volatility_chunk --input series {input.series}"
+        " --output garch {output.garch} --output dcc {output.dcc} --output weights {output.weights}"
+        " --options {params.options:q} --code {params.code} --log {log}"
+
+
+rule volatility:
+    """The tables of one array for one definition of r_t, with ARCH-LM; of a short recording, all the work."""
+    input:
+        series="results/{dataset}/{recording}/{axis}/series.parquet",
+        garch=garch_parts,
+        dcc=dcc_parts,
+        weights=weights_parts,
     output:
         garch="results/{dataset}/{recording}/{axis}/{definition}/garch.parquet",
         dcc="results/{dataset}/{recording}/{axis}/{definition}/dcc.parquet",
         arch_lm="results/{dataset}/{recording}/{axis}/{definition}/arch_lm.parquet",
         weights="results/{dataset}/{recording}/{axis}/{definition}/weights.parquet",
+        fits="results/{dataset}/{recording}/{axis}/{definition}/fits.parquet",
     log:
         "results/logs/{dataset}/{recording}/{axis}/{definition}/volatility.log",
     benchmark:
         "results/benchmarks/{dataset}/{recording}/{axis}/{definition}/volatility.tsv"
     resources:
-        mem_mb=2000,
+        mem_mb=1500,
         runtime=480,
     params:
         options=stage("board", "engine", "volatility"),
         code=code("volatility"),
     shell:
-        "python -m vgyro.tasks.volatility --input rates {input.rates}"
-        " --output garch {output.garch} --output dcc {output.dcc}"
-        " --output arch_lm {output.arch_lm} --output weights {output.weights}"
+        "python -m vgyro.tasks.volatility --input series {input.series}"
+        " --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
+        " --output garch {output.garch} --output dcc {output.dcc} --output arch_lm {output.arch_lm}"
+        " --output weights {output.weights} --output fits {output.fits}"
         " --options {params.options:q} --code {params.code} --log {log}"
