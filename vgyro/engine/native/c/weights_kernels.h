@@ -2,8 +2,9 @@
 
 #define SINGULAR 1e-12 /* as in vgyro.engine.covariance */
 #define NOISE (8 * 0x1p-53)
-/* Steps of the refinement, by the largest x: after one so small there is no need of more precise residuals; the last. */
-#define WELL_CONDITIONED 0x1p-46
+/* With pivots at least this large one step of refinement with plain residuals leaves no more than rounding. */
+#define WELL_CONDITIONED 0x1p-6
+/* Steps of the refinement, as shares of the largest x: the last one. */
 #define LAST_STEP 0x1p-27
 #define REFINEMENTS 20
 #define BLOCK_EXCHANGES 16
@@ -21,12 +22,12 @@ VG_INLINE v4 VG(gather)(const double *const *from, size_t place) {
     return (v4){from[0][place], from[1][place], from[2][place], from[3][place]};
 }
 
-/* LDL' of A on the support; off it the matrix reads as the identity. Returns the lanes with positive pivots only.
-   shift : factor of the diagonal. */
-VG_INLINE m4 VG(factorise)(size_t n, const v4 *A, v4 shift, const m4 *support, v4 *L, v4 *inverse) {
+/* LDL' of A on the support; off it the matrix reads as the identity. Returns the smallest pivot, NaN or
+   not positive in the lanes that have no such factors.  shift : factor of the diagonal. */
+VG_INLINE v4 VG(factorise)(size_t n, const v4 *A, v4 shift, const m4 *support, v4 *L, v4 *inverse) {
     const v4 one = v4_set(1.0);
     v4 pivots[WEIGHTS_MAX], scaled[WEIGHTS_MAX];
-    m4 positive = ~(m4){0};
+    v4 smallest = v4_set(INFINITY);
 #pragma GCC unroll 8
     for (size_t j = 0; j < n; j++) {
         v4 pivot = v4_select(support[j], A[j * n + j] * shift, one);
@@ -35,7 +36,7 @@ VG_INLINE m4 VG(factorise)(size_t n, const v4 *A, v4 shift, const m4 *support, v
             scaled[k] = L[j * n + k] * pivots[k];
             pivot -= L[j * n + k] * scaled[k];
         }
-        positive &= pivot > 0.0;
+        smallest = v4_select(pivot >= smallest, smallest, pivot); /* NaN stays: later pivots are NaN, too */
         pivots[j] = pivot;
         inverse[j] = one / pivot;
 #pragma GCC unroll 8
@@ -46,7 +47,7 @@ VG_INLINE m4 VG(factorise)(size_t n, const v4 *A, v4 shift, const m4 *support, v
             L[i * n + j] = sum * inverse[j];
         }
     }
-    return positive;
+    return smallest;
 }
 
 /* x of LDL'x = b. */
@@ -130,14 +131,16 @@ VG_INLINE v4 VG(refine)(
    near : x and residuals smaller than this may have the wrong sign. Returns the lanes that could be solved. */
 VG_INLINE m4 VG(solve)(size_t n, const v4 *A, const v4 *b, const m4 *support, v4 *x, v4 *residual, v4 *size, v4 *near) {
     v4 L[WEIGHTS_MAX * WEIGHTS_MAX], inverse[WEIGHTS_MAX], wanted[WEIGHTS_MAX], largest;
-    const m4 solved = VG(factorise)(n, A, v4_set(1.0), support, L, inverse);
+    const v4 smallest = VG(factorise)(n, A, v4_set(1.0), support, L, inverse);
+    const m4 solved = smallest > 0.0;
     for (size_t i = 0; i < n; i++) {
         wanted[i] = (v4)((m4)b[i] & support[i]);
         size[i] = v4_set(0.0); /* where the sign is clear without it */
     }
     VG(substitute)(n, L, inverse, wanted, x);
     VG(plain_residual)(n, A, b, x, residual);
-    m4 rough = solved & (VG(refine)(n, L, inverse, residual, support, solved, x, &largest) > WELL_CONDITIONED);
+    VG(refine)(n, L, inverse, residual, support, solved, x, &largest);
+    m4 rough = solved & (smallest < WELL_CONDITIONED);
     for (int count = 0; count < REFINEMENTS && m4_any(rough); count++) {
         VG(residual)(n, A, b, x, residual, size);
         /* The next step would be smaller than this one as this one is than x. */
@@ -196,7 +199,7 @@ VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, m4 *support, v4 *w) {
         good &= (H[i * n + i] > 0.0) & (H[i * n + i] < INFINITY);
     }
     VG(equilibrate)(n, H, A, scale);
-    good &= VG(factorise)(n, A, v4_set(1.0 - SINGULAR), full, L, x);
+    good &= VG(factorise)(n, A, v4_set(1.0 - SINGULAR), full, L, x) > 0.0;
     m4 open = good;
     while (m4_any(open)) {
         const m4 solved = VG(solve)(n, A, scale, support, x, residual, size, &near);
