@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from vgyro import engine
+from vgyro.engine import ENGINES
 from vgyro.errors import EngineError, TooShort
 from vgyro.metrics import allan_deviation, averaging_factors, read_curve
 from vgyro.metrics.noise_type import exponent_by_autocorrelation, exponent_by_ratio, noise_exponents
@@ -32,15 +33,17 @@ def test_nbs14_thousand_points():
     np.testing.assert_allclose(curve.deviation, [0.2922319, 0.09159953, 0.03241343], rtol=1e-6)
 
 
-def test_limits_of_sp1065():
+@pytest.mark.parametrize("name", ENGINES)
+def test_limits_of_sp1065(name: str):
     # NIST SP 1065, table 32: σ = 9.159953e-2 with 146.177 d.o.f. at 95 %. Its chi² is good to 1e-3 only.
-    low, high = engine.get("reference").allan.limits(np.array([9.159953e-02]), np.array([146.177]), 0.95)
+    low, high = engine.get(name).allan.limits(np.array([9.159953e-02]), np.array([146.177]), 0.95)
     np.testing.assert_allclose([low[0], high[0]], [8.223942e-02, 1.035201e-01], rtol=1e-3)
 
 
-def test_equals_allantools():
+@pytest.mark.parametrize("name", ENGINES)
+def test_equals_allantools(name: str):
     rate = np.random.default_rng(1).standard_normal(5000)
-    curve = allan_deviation(rate, 50.0)
+    curve = allan_deviation(rate, 50.0, engine=name)
     _, expected, _, _ = allantools.oadev(rate, 50.0, "freq", taus=curve.tau)
     np.testing.assert_allclose(curve.deviation, expected, rtol=1e-12)
     for tau, value, low, high, edf, alpha in zip(
@@ -142,16 +145,23 @@ def test_read_curve_interpolates_a_power_law_exactly():
     assert np.isnan(read_curve(curve, 1e6)).all()
 
 
-@pytest.mark.parametrize(("power", "differences"), [(0, 0), (-2, 1), (2, -1)])
-def test_noise_type_equals_allantools(power: int, differences: int):
+@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize(("power", "sums"), [(0, 0), (-2, 1)])
+def test_noise_type_equals_allantools(power: int, sums: int, name: str):
     series = np.random.default_rng(8).standard_normal(20_000)
-    series = np.cumsum(series) if differences == 1 else np.diff(series) if differences == -1 else series
-    for factor in (1, 10, 100):
-        ours = round(exponent_by_autocorrelation([series[: 20_000 // factor * factor].reshape(-1, factor).mean(axis=1)])
-                     if len(series) == 20_000 else exponent_by_autocorrelation([series]))  # fmt: skip
+    series = np.cumsum(series) if sums else series
+    factors = np.array([1, 10, 100])
+    for factor, *lags in zip(factors, *engine.get(name).allan.lag_products(series, factors), strict=True):
+        ours = round(exponent_by_autocorrelation(*lags))
         assert ours == power
-        if len(series) == 20_000:
-            assert ours == max(allantools.autocorr_noise_id(series, factor, data_type="freq")[0], -4)
+        assert ours == max(allantools.autocorr_noise_id(series, int(factor), data_type="freq")[0], -4)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_noise_type_of_white_noise_of_the_angle(name: str):
+    series = np.diff(np.random.default_rng(8).standard_normal(20_001))
+    squares, products = engine.get(name).allan.lag_products(series, np.array([1]))
+    assert round(exponent_by_autocorrelation(squares[0], products[0])) == 2
 
 
 def test_noise_type_of_few_blocks_by_the_variance_ratio():
@@ -166,7 +176,7 @@ def test_noise_type_of_few_blocks_by_the_variance_ratio():
 def test_noise_type_never_rises_with_tau():
     rng = np.random.default_rng(10)
     rate = rng.standard_normal(20_000) + np.cumsum(0.02 * rng.standard_normal(20_000))
-    exponents = noise_exponents([rate], averaging_factors(1.0, rate.size))
+    exponents = noise_exponents([rate], averaging_factors(1.0, rate.size), engine.get("native").allan)
     assert np.all(np.diff(exponents) <= 0)
     assert exponents[0] == 0
     assert exponents[-1] == -2

@@ -82,7 +82,9 @@ def test_figures_of_an_array():
     truth = swing(60)
     gyros = truth[:, None] + 1.5 * rng.standard_normal((truth.size, 4)) + np.array([0.2, -0.1, 0.1, 0.2])
     values = np.column_stack([gyros, gyros.mean(axis=1), swing(60, 0.9, 0.05)])
-    figures = dynamic_figures(values, truth, RATE_HZ, np.zeros(truth.size, dtype=int), 4, MetricsOptions(bootstrap=200))
+    figures = dynamic_figures(
+        list(values.T), truth, RATE_HZ, np.zeros(truth.size, dtype=int), 4, MetricsOptions(bootstrap=200)
+    )
     average, lagging = figures[4], figures[5]
     assert average["if_sigma"].low <= 2.0 <= average["if_sigma"].high
     assert average["if_sigma"].value == pytest.approx(2.0, rel=0.02)
@@ -98,7 +100,7 @@ def test_figures_of_an_array():
 
 def test_unknown_reference_is_a_note_not_an_error():
     figures = dynamic_figures(
-        np.ones((100, 2)), np.full(100, np.nan), RATE_HZ, np.zeros(100, dtype=int), 1, MetricsOptions(bootstrap=50)
+        [np.ones(100)] * 2, np.full(100, np.nan), RATE_HZ, np.zeros(100, dtype=int), 1, MetricsOptions(bootstrap=50)
     )
     assert math.isnan(figures[0]["error_sigma"].value)
     assert figures[0]["error_sigma"].note

@@ -72,7 +72,7 @@ def test_average_of_white_gyros_gains_root_n():
     rng = np.random.default_rng(2)
     gyros = 0.02 + N * np.sqrt(50.0) * rng.standard_normal((90_000, 6))
     values = np.column_stack([gyros, gyros.mean(axis=1)])
-    found = static_figures(values, 50.0, np.zeros(90_000, dtype=int), 6, [LowPass()] * 7, OPTIONS).readings
+    found = static_figures(values.T, 50.0, np.zeros(90_000, dtype=int), 6, [LowPass()] * 7, OPTIONS).readings
     for name in ("if_sigma", "if_arw_1s", "if_bias_drift"):
         factor = found[6][name]
         assert factor.low <= math.sqrt(6) <= factor.high, name
@@ -118,16 +118,16 @@ def test_poses_do_not_enter_sigma():
     rng = np.random.default_rng(3)
     segment = np.repeat(np.arange(10), 1500)
     values = rng.standard_normal((15_000, 2)) + 5 * rng.standard_normal((10, 1))[segment]
-    found = static_figures(values, 50.0, segment, 2, [LowPass()] * 2, OPTIONS, poses=True).readings
+    found = static_figures(values.T, 50.0, segment, 2, [LowPass()] * 2, OPTIONS, poses=True).readings
     assert found[0]["sigma"].value == pytest.approx(1.0, rel=0.02)
     assert "pose" in found[0]["sigma"].note
-    joined = static_figures(values, 50.0, segment, 2, [LowPass()] * 2, OPTIONS).readings
+    joined = static_figures(values.T, 50.0, segment, 2, [LowPass()] * 2, OPTIONS).readings
     assert joined[0]["sigma"].value > 2
 
 
 def test_constant_series_has_figures():
     values = np.column_stack([np.full(3000, 0.5), np.random.default_rng(4).standard_normal(3000)])
-    found = static_figures(values, 50.0, np.zeros(3000, dtype=int), 1, [LowPass()] * 2, OPTIONS).readings
+    found = static_figures(values.T, 50.0, np.zeros(3000, dtype=int), 1, [LowPass()] * 2, OPTIONS).readings
     assert found[0]["sigma"].value == 0
     assert found[0]["arw"].value == 0
     assert found[0]["bias_drift"].value == 0

@@ -3,7 +3,7 @@
 Pure functions of arrays in deg/s. docs/metrics.md explains every figure and its convention.
 """
 
-from vgyro.metrics.allan import AllanCurve, allan_deviation, averaging_factors, read_curve
+from vgyro.metrics.allan import AllanCurve, allan_deviation, averaging_factors, read_curve, stretches
 from vgyro.metrics.bootstrap import Resampled, Units, block_length, make_units, resample
 from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, model_deviation, noise_coefficients
 from vgyro.metrics.correlation import Correlation, correlation_matrix
@@ -51,6 +51,7 @@ __all__ = [
     "resample",
     "spectral_density",
     "static_figures",
+    "stretches",
     "thinned",
     "without_means",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +37,12 @@ def allan_deviation(
     taus: np.ndarray | None = None,
     segment: np.ndarray | None = None,
     confidence: float = 0.95,
-    engine: str = "reference",
+    engine: str = "native",
     per_octave: int = TAUS_PER_OCTAVE,
 ) -> AllanCurve:
     """Overlapping Allan deviation, chi² limits and equivalent degrees of freedom.
 
-    rate       : array [T], deg/s, at a constant rate_hz within each segment
+    rate       : array [T], deg/s, at a constant rate_hz within each segment; float32 is not copied
     taus       : array, s, rounded to whole samples; None: `per_octave` a factor 2, from one sample to a third of the
                  longest segment, with τ = 1 s among them where that is a whole number of samples
     segment    : array [T] int, number of the gap-free stretch of each sample; None: there is no gap
@@ -52,8 +53,7 @@ def allan_deviation(
     raises     : TooShort if no segment has three samples
     Riley, NIST SP 1065, eq. 11 and 45; edf: Greenhall & Riley (2003), with the noise identified at each τ.
     """
-    rate = np.asarray(rate, dtype=float)
-    pieces = split_segments(rate, segment)
+    pieces = split_segments(floating(rate), segment)
     longest = max((piece.size for piece in pieces), default=0)
     factors = averaging_factors(rate_hz, longest, taus, per_octave)
     if factors.size == 0:
@@ -68,12 +68,12 @@ def allan_deviation(
             piece_sums, piece_counts = allan.second_differences(piece, rate_hz, factors[used])
             sums[used] += piece_sums
             counts[used] += piece_counts
-    exponent = noise_exponents(pieces, factors)
-    lengths = [piece.size for piece in pieces]
-    edf = np.array([
-        sum(allan.degrees_of_freedom(int(alpha), int(m), n) for n in lengths if n >= LONGEST_TAU * m)
-        for m, alpha in zip(factors, exponent, strict=True)
-    ])  # fmt: skip
+    exponent = noise_exponents(pieces, factors, allan)
+    lengths, alike = np.unique([piece.size for piece in pieces], return_counts=True)
+    edf = np.empty(factors.size)
+    for row, (m, alpha) in enumerate(zip(factors.tolist(), exponent.tolist(), strict=True)):
+        used = lengths >= LONGEST_TAU * m
+        edf[row] = np.sum(alike[used] * allan.degrees_of_freedom(alpha, m, lengths[used]))
     deviation = np.sqrt(sums / counts)
     low, high = allan.limits(deviation, edf, confidence)
     return AllanCurve(factors / rate_hz, deviation, low, high, edf, exponent, confidence)
@@ -93,14 +93,23 @@ def averaging_factors(
     return factors[(factors >= 1) & (factors <= longest)]
 
 
+def floating(values: np.ndarray) -> np.ndarray:
+    """Values as floating-point numbers, float32 as it is: all figures are summed in double precision."""
+    values = np.asarray(values)
+    return values if values.dtype == np.float32 else values.astype(float, copy=False)
+
+
 def split_segments(rate: np.ndarray, segment: np.ndarray | None) -> list[np.ndarray]:
     """The gap-free stretches of `rate`: runs of equal `segment`."""
-    if rate.shape[0] == 0:
-        return []
     if segment is None:
-        return [rate]
-    borders = np.flatnonzero(np.diff(segment)) + 1
-    return np.split(rate, borders)
+        return [rate] if len(rate) else []
+    return [rate[start:stop] for start, stop in stretches(segment)]
+
+
+def stretches(segment: np.ndarray) -> list[tuple[int, int]]:
+    """First sample, and one past the last, of each run of equal `segment` [T]."""
+    borders = [0, *(np.flatnonzero(segment[1:] != segment[:-1]) + 1).tolist(), len(segment)]
+    return list(itertools.pairwise(borders)) if len(segment) else []
 
 
 def read_curve(curve: AllanCurve, tau: float) -> tuple[float, float, float]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.metrics.allan import stretches
 from vgyro.metrics.correlation import autocorrelation, correlation_length
 
 UNIT_S = 1.0
 FEWEST_UNITS = 8
 FEWEST_BLOCKS = 8
+UNITS_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
@@ -56,44 +57,74 @@ def block_length(units: np.ndarray) -> int:
     return int(min(max(rule, lowest), highest))
 
 
-def make_units(rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = None) -> Units:
-    """Cut series [T, S] at rate_hz into units of 1 s (at least one sample); a stretch's last unit may be longer."""
-    samples, number = rate.shape
+@dataclass(frozen=True)
+class UnitGrid:
+    """Where samples are cut into units of about 1 s, the last one of a stretch longer.
+
+    at [U] : first sample of each unit;  samples, length : of the series, and of an ordinary unit
+    valid [U] : samples of the unit at which a second difference may begin: all but those at the end of a stretch
+    """
+
+    at: np.ndarray
+    samples: int
+    length: int
+    valid: np.ndarray
+
+    def units_of(self, series: np.ndarray) -> Units:
+        """Units of one series [T], a part of it at a time."""
+        count = np.diff(np.append(self.at, self.samples))
+        sums = np.zeros((3, len(self.at)))
+        for start in range(0, len(self.at), UNITS_AT_ONCE):
+            part = slice(start, start + UNITS_AT_ONCE)
+            sums[:, part] = self._sums(series, self.at[part], count[part], self.valid[part])
+        total, squares, steps = sums[:, :, None]
+        return Units(count.astype(float), total, squares, steps, self.valid.astype(float))
+
+    def _sums(self, series: np.ndarray, at: np.ndarray, count: np.ndarray, valid: np.ndarray) -> np.ndarray:
+        """Sum, squares, and squares of half the second differences at 1 s, [3, units of this part]."""
+        first, samples, length = int(at[0]), int(count.sum()), self.length
+        values = series[first : first + samples + 2 * length].astype(float)
+        angle = np.empty(values.size + 1)
+        angle[0] = 0.0
+        np.cumsum(values - values.mean(), out=angle[1:])
+        inside, own = at - first, values[:samples]
+        steps = np.zeros(samples)
+        whole = min(max(angle.size - 2 * length, 0), samples)
+        if whole:
+            middle = angle[length : length + whole]
+            difference = angle[2 * length : 2 * length + whole] - middle - (middle - angle[:whole])
+            steps[:whole] = difference**2 / (2 * length**2)
+        for unit in np.flatnonzero(valid < count).tolist():
+            steps[inside[unit] + valid[unit] : inside[unit] + count[unit]] = 0.0
+        return np.stack([np.add.reduceat(row, inside) for row in (own, own**2, steps)])
+
+
+def unit_grid(cuts: list[tuple[int, int]], rate_hz: float) -> UnitGrid:
+    """Cut the samples at rate_hz into units of 1 s, at least one sample.
+
+    cuts : first sample and last + 1 of each gap-free stretch, one after another; no unit lies across two
+    """
     length = max(round(UNIT_S * rate_hz), 1)
-    borders = [0, samples] if segment is None else [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), samples]
-    starts: list[int] = []
-    for start, stop in itertools.pairwise(borders):
-        starts += [start + index * length for index in range(max((stop - start) // length, 1 if stop > start else 0))]
-    at = np.array(starts, dtype=np.int64)
-    count = np.diff(np.append(at, samples)).astype(float)
-    total, squares, steps = (np.empty((len(at), number)) for _ in range(3))
-    valid = _differences_valid(samples, length, borders)
-    step_count = np.add.reduceat(valid.astype(float), at)
-    for column in range(number):
-        series = np.ascontiguousarray(rate[:, column], dtype=float)
-        total[:, column] = np.add.reduceat(series, at)
-        squares[:, column] = np.add.reduceat(series**2, at)
-        steps[:, column] = np.add.reduceat(_squared_steps(series, length, valid), at)
-    return Units(count, total, squares, steps, step_count)
+    starts = [start + length * np.arange(max((stop - start) // length, 1)) for start, stop in cuts]
+    ends = [np.full(len(one), stop) for one, (_, stop) in zip(starts, cuts, strict=True)]
+    at = np.concatenate([np.empty(0, np.int64), *starts])
+    last = np.concatenate([np.empty(0, np.int64), *ends]) - 2 * length + 1
+    samples = cuts[-1][1] if cuts else 0
+    return UnitGrid(at, samples, length, np.clip(last - at, 0, np.diff(np.append(at, samples))))
 
 
-def _differences_valid(samples: int, length: int, borders: list[int]) -> np.ndarray:
-    valid = np.zeros(samples, dtype=bool)
-    for start, stop in itertools.pairwise(borders):
-        valid[start : max(stop - 2 * length + 1, start)] = True
-    return valid
+def joined(units: list[Units]) -> Units:
+    """The units of several series on one grid."""
+    total, squares, steps = (
+        np.concatenate([getattr(one, name) for one in units], axis=1) for name in ("total", "squares", "steps")
+    )
+    return Units(units[0].count, total, squares, steps, units[0].step_count)
 
 
-def _squared_steps(series: np.ndarray, length: int, valid: np.ndarray) -> np.ndarray:
-    """Half the squared difference of adjacent means over `length` samples, for the difference that begins at k."""
-    angle = np.concatenate(([0.0], np.cumsum(series - series.mean())))
-    steps = np.zeros(series.size)
-    whole = series.size - 2 * length + 1
-    if whole > 0:
-        difference = angle[2 * length :] - 2 * angle[length:-length] + angle[: -2 * length]
-        steps[:whole] = difference**2 / (2 * length**2)
-    steps[~valid] = 0.0
-    return steps
+def make_units(rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = None) -> Units:
+    """Units of series [T, S] at rate_hz."""
+    grid = unit_grid(stretches(np.zeros(len(rate), np.int8) if segment is None else segment), rate_hz)
+    return joined([grid.units_of(rate[:, column]) for column in range(rate.shape[1])])
 
 
 @dataclass(frozen=True)
@@ -117,23 +148,26 @@ def resample(units: Units, replicates: int, seed: int, block: int | None = None)
         block = max(units.block_length(column) for column in range(series))
     blocks = -(-number // block)
     starts = np.random.default_rng(seed).integers(0, number - block + 1, (replicates, blocks))
-    count = _block_sums(units.count[:, None], starts, block)
+    count = block_sums(units.count[:, None], starts, block)
     centre = units.total.sum(axis=0) / units.count.sum()
     # Moments about the overall mean: those about zero would cancel where a bias is large against the noise.
     shifted = units.total - units.count[:, None] * centre
     squares = units.squares - 2 * centre * units.total + units.count[:, None] * centre**2
-    mean = _block_sums(shifted, starts, block) / count
-    variance = (_block_sums(squares, starts, block) - count * mean**2) / np.maximum(count - 1, 1)
-    step_count = _block_sums(units.step_count[:, None], starts, block)
+    mean = block_sums(shifted, starts, block) / count
+    variance = (block_sums(squares, starts, block) - count * mean**2) / np.maximum(count - 1, 1)
+    step_count = block_sums(units.step_count[:, None], starts, block)
     with np.errstate(invalid="ignore", divide="ignore"):
-        allan = _block_sums(units.steps, starts, block) / step_count
+        allan = block_sums(units.steps, starts, block) / step_count
     return Resampled(mean + centre, np.sqrt(np.maximum(variance, 0)), np.sqrt(np.maximum(allan, 0)), block)
 
 
-def _block_sums(values: np.ndarray, starts: np.ndarray, block: int) -> np.ndarray:
-    running = np.concatenate((np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)))
-    sums = running[block:] - running[:-block]
-    return np.stack([sums[row].sum(axis=0) for row in starts])
+def block_sums(values: np.ndarray, starts: np.ndarray, block: int) -> np.ndarray:
+    """Sums [R, S] of values [U, S] over the blocks that begin at starts [R, blocks]."""
+    sums = np.empty((len(starts), values.shape[1]))
+    for column in range(values.shape[1]):
+        running = np.concatenate(([0.0], np.cumsum(values[:, column])))
+        sums[:, column] = (running[block:] - running[:-block])[starts].sum(axis=1)
+    return sums
 
 
 def percentile_limits(replicates: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:

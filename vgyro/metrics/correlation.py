@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.metrics.allan import split_segments
+from vgyro.metrics.allan import floating, stretches
 
 LARGEST_LAG_SHARE = 4
 WINDOW_FACTOR = 5
+FIRST_LAGS, MORE_LAGS = 1 << 10, 16
+PARTS = 4  # an FFT is so many times as long as the lags
+CHUNK = 1 << 16  # samples of all gyros at once
+BATCH = 1 << 18  # samples that are transformed together
 
 
 @dataclass(frozen=True)
@@ -23,12 +28,17 @@ class Correlation:
 
 
 def correlation_matrix(
-    rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = None, confidence: float = 0.95
+    rate: np.ndarray,
+    rate_hz: float,
+    segment: np.ndarray | None = None,
+    confidence: float = 0.95,
+    truth: np.ndarray | None = None,
 ) -> Correlation:
     """Correlation factors c_ij = cov(g_i, g_j) / √(cov(g_i, g_i) cov(g_j, g_j)) of the sampled noise.
 
     rate    : array [T, N], deg/s, at rest;  rate_hz : kept for symmetry with the other figures
     segment : array [T] int; each stretch's mean is removed (a rest pose's own bias is not noise)
+    truth   : array [T], deg/s, taken off every gyro where the board moves; None: nothing
     returns : Correlation; limits by Fisher's z with n independent samples, n = T / (1 + 2 Σ_k ρ_i(k) ρ_j(k)): drift
               common in time makes few samples of many (Bartlett 1935). The diagonal is 1 without limits' width.
     Jiang et al. (2012), eq. 22 and table 1; Fisher (1921).
@@ -36,16 +46,14 @@ def correlation_matrix(
     from scipy.special import ndtri
 
     del rate_hz
-    rate = np.asarray(rate, dtype=float)
-    pieces = [piece - piece.mean(axis=0) for piece in split_segments(rate, segment)]
+    noise = _Noise.of(rate, segment, truth)
     number = rate.shape[1]
-    samples = sum(len(piece) for piece in pieces)
-    covariance = sum((piece.T @ piece for piece in pieces), np.zeros((number, number)))
+    covariance = sum((part.T @ part for part in noise.parts()), np.zeros((number, number)))
     scale = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         value = np.clip(covariance / np.outer(scale, scale), -1, 1)
     value[scale == 0] = value[:, scale == 0] = np.nan
-    effective = _effective_samples(np.concatenate(pieces) if pieces else rate, samples)
+    effective = _effective_samples(noise)
     with np.errstate(divide="ignore", invalid="ignore"):
         z = np.arctanh(value)
         half = ndtri(0.5 + confidence / 2) / np.sqrt(np.maximum(effective - 3, 0))
@@ -58,31 +66,98 @@ def correlation_matrix(
     return Correlation(value, low, high, effective)
 
 
-def _effective_samples(centred: np.ndarray, samples: int) -> np.ndarray:
-    number = centred.shape[1]
+@dataclass(frozen=True)
+class _Noise:
+    """Rates [T, N] less the truth [T] less the mean [N] of each stretch, made in parts: it may be too long to hold."""
+
+    rate: np.ndarray
+    truth: np.ndarray | None
+    cuts: list[tuple[int, int]]
+    means: list[np.ndarray]
+
+    @classmethod
+    def of(cls, rate: np.ndarray, segment: np.ndarray | None, truth: np.ndarray | None) -> _Noise:
+        rate = floating(rate)
+        cuts = stretches(np.zeros(len(rate), np.int8) if segment is None else segment)
+        means = [rate[start:stop].mean(axis=0, dtype=float) for start, stop in cuts]
+        if truth is not None:
+            means = [mean - truth[start:stop].mean() for (start, stop), mean in zip(cuts, means, strict=True)]
+        return cls(rate, truth, cuts, means)
+
+    def parts(self) -> Iterator[np.ndarray]:
+        """All gyros [≤ CHUNK, N], in order."""
+        for (start, stop), mean in zip(self.cuts, self.means, strict=True):
+            for first in range(start, stop, CHUNK):
+                part = self.rate[first : min(first + CHUNK, stop)] - mean
+                yield part if self.truth is None else part - self.truth[first : first + len(part), None]
+
+    def column(self, gyro: int) -> np.ndarray:
+        """One gyro [T]."""
+        column = self.rate[:, gyro].astype(float)
+        for (start, stop), mean in zip(self.cuts, self.means, strict=True):
+            column[start:stop] -= mean[gyro]
+        if self.truth is not None:
+            column -= self.truth
+        return column
+
+
+def _effective_samples(noise: _Noise) -> np.ndarray:
+    """T / (1 + 2 Σ ρ_i(k) ρ_j(k)) [N, N], by as many lags as every sum needs to end, at most T/4."""
+    samples, number = noise.rate.shape
+    effective = np.full((number, number), float(samples))
     if samples < WINDOW_FACTOR * LARGEST_LAG_SHARE:
-        return np.full((number, number), float(samples))
-    functions = np.array([autocorrelation(centred[:, gyro], samples // LARGEST_LAG_SHARE) for gyro in range(number)])
-    effective = np.empty((number, number))
+        return effective
+    most = samples // LARGEST_LAG_SHARE
+    lags = min(FIRST_LAGS, most)
+    while True:
+        functions = [autocorrelation(noise.column(gyro), lags) for gyro in range(number)]
+        sums = [_sum_to_window(functions[i] * functions[j]) for i in range(number) for j in range(i, number)]
+        if lags == most or all(ended for _, ended in sums):
+            break
+        lags = min(lags * MORE_LAGS, most)
+    lengths = iter(sums)
     for row in range(number):
         for column in range(row, number):
-            length = correlation_length(functions[row] * functions[column])
-            effective[row, column] = effective[column, row] = min(samples / length, samples)
+            effective[row, column] = effective[column, row] = min(samples / next(lengths)[0], samples)
     return effective
 
 
 def autocorrelation(centred: np.ndarray, lags: int) -> np.ndarray:
-    """Autocorrelation at lags 0 … lags - 1 of a series without mean (by FFT, divided by T); zeros if it is constant."""
+    """Autocorrelation at lags 0 … lags - 1 of a series without mean (divided by T); zeros if it is constant."""
+    function = lagged_products(centred, centred, lags)
+    return function / function[0] if function[0] > 0 else np.zeros(lags)
+
+
+def lagged_products(first: np.ndarray, second: np.ndarray, lags: int) -> np.ndarray:
+    """Σ_t first[t] second[t + k] for k = 0 … lags - 1, as far as there is a second[t + k].
+
+    By FFT; series much longer than the lags are cut into parts of `first`, each with what it meets of `second`.
+    """
     from scipy.fft import irfft, next_fast_len, rfft
 
-    size = next_fast_len(len(centred) + lags, real=True)
-    transform = rfft(centred, size)
-    function = irfft(transform.real**2 + transform.imag**2, size)[:lags]
-    return function / function[0] if function[0] > 0 else np.zeros(lags)
+    number = len(first)
+    part = number if number <= PARTS * lags else (PARTS - 1) * lags
+    size = next_fast_len(part + lags, real=True)
+    spectrum = np.zeros(size // 2 + 1, complex)
+    whole = min(number, len(second) - lags) // part if part < number else 0
+    batch = max(BATCH // size, 1)
+    for start in range(0, whole, batch):
+        chosen = slice(start * part, (min(start + batch, whole) - 1) * part + 1, part)
+        transform = rfft(np.lib.stride_tricks.sliding_window_view(second, part + lags)[chosen], size)
+        transform *= rfft(np.lib.stride_tricks.sliding_window_view(first, part)[chosen], size).conj()
+        spectrum += transform.sum(axis=0)
+    for start in range(whole * part, number, part):
+        spectrum += rfft(first[start : start + part], size).conj() * rfft(second[start : start + part + lags], size)
+    return irfft(spectrum, size)[:lags]
 
 
 def correlation_length(function: np.ndarray) -> float:
     """1 + 2 Σ function(k), summed to the first lag beyond five times the sum so far (Sokal's window); at least 1."""
+    return _sum_to_window(function)[0]
+
+
+def _sum_to_window(function: np.ndarray) -> tuple[float, bool]:
+    """correlation_length, and whether its window ends within the function."""
     sums = 2 * np.cumsum(function) - 1
     beyond = np.flatnonzero(np.arange(len(function)) >= WINDOW_FACTOR * sums)
-    return float(max(sums[beyond[0]] if beyond.size else sums[-1], 1.0))
+    return float(max(sums[beyond[0]] if beyond.size else sums[-1], 1.0)), bool(beyond.size)

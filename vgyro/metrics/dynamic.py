@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.metrics.bootstrap import UNITS_AT_ONCE, UnitGrid, Units, joined, unit_grid
+from vgyro.metrics.correlation import lagged_products
+from vgyro.metrics.truth import Truth, known_stretches
+
 MOST_DELAY_S = 1.0
 NEWTON_STEPS = 8
-STILL = 1e-9
 SMALL_STEP_S = 1e-9
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -22,8 +25,9 @@ class DynamicErrors:
     error_sigma_aligned     : the same after shifting the reference by the delay
     error_sigma_scaled      : about offset + gain · shifted reference
     amplitude deg/s, delay s, gain : of the fit
-    aligned, scaled, shifted, slope, inner_segment [I] : errors after alignment, the shifted reference (deg/s) and its
-        derivative (deg/s²), number of the stretch; the ends of the stretches are left out
+    sums     : of the errors after alignment, in units of 1 s: aligned, scaled; the ends of the stretches are left out
+    products : [U, 9] of the fit's derivatives by offset, gain and delay (1, x, d): 11 1x 1d xx xd dd, then 1, x and d
+               times the error about the fit, summed over the same units
     """
 
     error_mean: float
@@ -33,21 +37,18 @@ class DynamicErrors:
     amplitude: float = math.nan
     delay: float = math.nan
     gain: float = math.nan
-    aligned: np.ndarray = field(default_factory=lambda: np.empty(0))
-    scaled: np.ndarray = field(default_factory=lambda: np.empty(0))
-    shifted: np.ndarray = field(default_factory=lambda: np.empty(0))
-    slope: np.ndarray = field(default_factory=lambda: np.empty(0))
-    inner_segment: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    sums: Units | None = None
+    products: np.ndarray | None = None
     note: str = ""
 
 
 @dataclass(frozen=True)
-class _Alignment:
-    delay: float
+class _Fit:
+    """rate = offset + gain · reference(t - delay)"""
+
     offset: float
     gain: float
-    shifted: np.ndarray
-    slope: np.ndarray
+    delay: float
 
 
 def dynamic_errors(
@@ -70,89 +71,88 @@ def dynamic_errors(
     Jiang et al. (2012), table 3 gives mean, 1σ (raw) and amplitude.
     """
     rate, reference = np.asarray(rate, dtype=float), np.asarray(reference, dtype=float)
-    used = np.isfinite(rate) & np.isfinite(reference)
-    error = (rate - reference)[used]
+    known = np.isfinite(rate) & np.isfinite(reference)
+    cuts = known_stretches(known, segment)
+    return errors_of(rate[known], Truth.of(reference[known], rate_hz, cuts, most_delay_s))
+
+
+def errors_of(rate: np.ndarray, truth: Truth) -> DynamicErrors:
+    """dynamic_errors of a rate [T] without NaN against a truth that serves several series."""
+    error = rate - truth.reference
     mean = float(error.mean()) if error.size else math.nan
     sigma = float(error.std(ddof=1)) if error.size > 1 else math.nan
-    if error.size < 2:
-        return DynamicErrors(mean, sigma, note="fewer than 2 samples with a reference")
-    swing = float(np.std(reference[used]))
-    if swing <= STILL * max(float(np.max(np.abs(reference[used]))), 1.0):
-        return DynamicErrors(mean, sigma, note="the reference does not change: no delay, gain or amplitude")
-    margin = max(round(most_delay_s * rate_hz), 1)
-    runs = [run for run in _runs(used, segment) if run.stop - run.start > 4 * margin]
-    if not runs:
-        return DynamicErrors(mean, sigma, note=f"no gap-free stretch is longer than {4 * most_delay_s:g} s")
-    lag = _coarse_lag(rate, reference, runs, margin)
-    inner = np.concatenate([np.arange(run.start + margin, run.stop - margin) for run in runs])
-    number = np.concatenate([np.full(run.stop - run.start - 2 * margin, index) for index, run in enumerate(runs)])
-    fit = _align(rate[inner], reference, runs, margin, lag / rate_hz, rate_hz)
-    aligned, scaled = rate[inner] - fit.shifted, rate[inner] - fit.offset - fit.gain * fit.shifted
+    if truth.note:
+        return DynamicErrors(mean, sigma, note=truth.note)
+    del error
+    fit = _align(rate, truth, _coarse_lag(rate, truth) / truth.rate_hz)
+    grid = unit_grid(truth.inner(), truth.rate_hz)
+    aligned, scaled, products = _errors_about(rate, truth, fit, grid)
     return DynamicErrors(
-        mean, sigma, float(aligned.std(ddof=1)), float(scaled.std(ddof=1)), float(fit.gain * math.sqrt(2) * swing),
-        fit.delay, fit.gain, aligned, scaled, fit.shifted, fit.slope, number,
+        mean, sigma, float(aligned.std(ddof=1)), float(scaled.std(ddof=1)), fit.gain * math.sqrt(2) * truth.swing,
+        fit.delay, fit.gain, joined([grid.units_of(aligned), grid.units_of(scaled)]), products,
     )  # fmt: skip
 
 
-def _runs(used: np.ndarray, segment: np.ndarray | None) -> list[slice]:
-    """Stretches of used samples that no gap breaks."""
-    change = np.diff(used.astype(np.int8)) != 0
-    if segment is not None:
-        change |= np.diff(segment) != 0
-    borders = [0, *(np.flatnonzero(change) + 1).tolist(), len(used)]
-    return [slice(a, b) for a, b in itertools.pairwise(borders) if used[a]]
-
-
-def _coarse_lag(rate: np.ndarray, reference: np.ndarray, runs: list[slice], margin: int) -> int:
+def _coarse_lag(rate: np.ndarray, truth: Truth) -> int:
     """Whole-sample lag of the highest correlation: inner part of the rate against the reference moved past it."""
-    from scipy.signal import correlate
-
-    products, squares, sums, count = np.zeros(2 * margin + 1), np.zeros(2 * margin + 1), np.zeros(2 * margin + 1), 0
-    centre = float(np.mean(reference[runs[0]]))
-    mean = sum(float(rate[run].sum()) for run in runs) / sum(run.stop - run.start for run in runs)
-    for run in runs:
+    margin = truth.margin
+    products = np.zeros(2 * margin + 1)
+    mean = sum(float(rate[run].sum()) for run in truth.runs) / sum(run.stop - run.start for run in truth.runs)
+    for run in truth.runs:
         inner = rate[run.start + margin : run.stop - margin] - mean
-        moving = reference[run] - centre
-        products += correlate(moving, inner, mode="valid", method="fft")
-        running, running_squares = (np.concatenate(([0.0], np.cumsum(x))) for x in (moving, moving**2))
-        sums += running[inner.size :] - running[: -inner.size]
-        squares += running_squares[inner.size :] - running_squares[: -inner.size]
-        count += inner.size
-    spread = np.maximum(squares - sums**2 / count, np.finfo(float).tiny)
+        products += lagged_products(inner, truth.reference[run] - truth.centre, 2 * margin + 1)
     # Position k of the moving reference stands for a delay of margin - k samples.
-    return margin - int(np.argmax(products / np.sqrt(spread)))
+    return margin - int(np.argmax(products / np.sqrt(truth.spread)))
 
 
-def _align(
-    measured: np.ndarray, reference: np.ndarray, runs: list[slice], margin: int, delay: float, rate_hz: float
-) -> _Alignment:
-    """Least squares of measured [I] = offset + gain · reference(t - delay), by Gauss-Newton from a delay, s."""
-    from scipy.interpolate import CubicSpline
-
-    splines = [CubicSpline(np.arange(run.stop - run.start), reference[run]) for run in runs]
-    positions = [np.arange(margin, run.stop - run.start - margin, dtype=float) for run in runs]
-    limit = margin / rate_hz
-
-    def moved(delay_s: float, derivative: int) -> np.ndarray:
-        parts = [spline(at - delay_s * rate_hz, derivative) for spline, at in zip(splines, positions, strict=True)]
-        return np.concatenate(parts) * rate_hz**derivative
-
-    best = (math.inf, delay, 0.0, 1.0)
+def _align(rate: np.ndarray, truth: Truth, delay: float) -> _Fit:
+    """Least squares of the inner rate = offset + gain · reference(t - delay), by Gauss-Newton from a delay, s."""
+    limit = truth.margin / truth.rate_hz
+    best, cost = _Fit(0.0, 1.0, delay), math.inf
     for _ in range(NEWTON_STEPS):
-        shifted = moved(delay, 0)
-        design = np.column_stack([np.ones_like(shifted), shifted])
-        (offset, gain), *_ = np.linalg.lstsq(design, measured, rcond=None)
-        left = measured - design @ (offset, gain)
-        cost = float(left @ left)
-        if cost < best[0]:
-            best = (cost, delay, float(offset), float(gain))
-        slope = -gain * moved(delay, 1)
-        slope -= design @ np.linalg.lstsq(design, slope, rcond=None)[0]
-        if not slope.any():
+        gram = np.zeros((4, 4))
+        for run, first, last in truth.parts():
+            at = slice(run.start + first, run.start + last)
+            value, slope = truth.moved(run, first, last, delay)
+            rows = np.stack([np.ones(last - first), value - truth.centre, slope, rate[at] - truth.centre])
+            gram += rows @ rows.T
+        # Rows and columns: 1, x, dx/dt, y; x and y counted from the centre.
+        offset, gain = np.linalg.solve(gram[:2, :2], gram[:2, 3]).tolist()
+        left = np.array([-offset, -gain, 0.0, 1.0])
+        squares = float(left @ gram @ left)
+        if squares <= cost * (1 + ROUNDING):
+            cost, best = squares, _Fit(offset + truth.centre * (1 - gain), gain, delay)
+        steepness = gram[2, 2] - gram[2, :2] @ np.linalg.solve(gram[:2, :2], gram[:2, 2])
+        if gain == 0 or steepness <= 0:
             break
-        step = float(slope @ left / (slope @ slope))
+        step = -float(gram[2] @ left) / (gain * float(steepness))
         delay = float(np.clip(delay + step, -limit, limit))
         if abs(step) < SMALL_STEP_S:
             break
-    _, delay, offset, gain = best
-    return _Alignment(delay, offset, gain, moved(delay, 0), moved(delay, 1))
+    return best
+
+
+def _errors_about(
+    rate: np.ndarray, truth: Truth, fit: _Fit, grid: UnitGrid
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Errors after alignment, and about the fit, of the inner samples [I]; the products of DynamicErrors."""
+    aligned, scaled = np.empty(grid.samples), np.empty(grid.samples)
+    products = np.empty((len(grid.at), 9))
+    for run, (start, stop) in zip(truth.runs, truth.inner(), strict=True):
+        first_unit, end_unit = np.searchsorted(grid.at, (start, stop)).tolist()
+        for unit in range(first_unit, end_unit, UNITS_AT_ONCE):
+            units = slice(unit, min(unit + UNITS_AT_ONCE, end_unit))
+            here = slice(int(grid.at[unit]), int(grid.at[units.stop]) if units.stop < end_unit else stop)
+            first, last = (place - start + truth.margin for place in (here.start, here.stop))
+            value, slope = truth.moved(run, first, last, fit.delay)
+            measured = rate[run.start + first : run.start + last]
+            aligned[here] = measured - value
+            scaled[here] = left = measured - fit.offset - fit.gain * value
+            slope *= -fit.gain
+            rows = (
+                np.ones(len(value)), value, slope, value * value, value * slope, slope * slope,
+                left, value * left, slope * left,
+            )  # fmt: skip
+            at = grid.at[units] - here.start
+            products[units] = np.stack([np.add.reduceat(row, at) for row in rows], axis=1)
+    return aligned, scaled, products

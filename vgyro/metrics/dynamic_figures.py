@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from vgyro.config import MetricsOptions
-from vgyro.metrics.bootstrap import Resampled, Units, make_units, resample
-from vgyro.metrics.dynamic import DynamicErrors, dynamic_errors
+from vgyro.metrics.bootstrap import Resampled, Units, block_sums, joined, resample, unit_grid
+from vgyro.metrics.dynamic import MOST_DELAY_S, DynamicErrors, errors_of
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.improvement import improvement_factor
 from vgyro.metrics.readings import moments
+from vgyro.metrics.truth import Truth, known_stretches
 
 SHIFTED = ("error_sigma_aligned", "error_sigma_scaled", "amplitude", "delay")
 OF_ERROR = "of the error"
 
 
 def dynamic_figures(
-    values: np.ndarray,
+    series: Sequence[np.ndarray],
     reference: np.ndarray,
     rate_hz: float,
     segment: np.ndarray,
@@ -27,46 +29,43 @@ def dynamic_figures(
 ) -> list[dict[str, Reading]]:
     """Errors of series against the true rate, and improvement factors of the virtual gyros.
 
-    values    : array [T, S], deg/s; the first `singles` columns are the gyros
+    series    : S arrays [T], deg/s; the first `singles` are the gyros. Each is taken twice, one at a time
     reference : array [T], deg/s; NaN where it is not known
     segment   : array [T] int, number of the gap-free stretch
     returns   : S dictionaries, name → Reading; where the reference does not change, delay and what depends on it are
                 NaN with a note. Limits by moving-block bootstrap, the improvement factors with common blocks.
     """
-    known = np.isfinite(reference) & np.isfinite(values).all(axis=1)
-    values, reference, segment = values[known], reference[known], segment[known] * 2 + _skips(known)
-    if len(values) < 2:
-        nothing = Reading(math.nan, math.nan, math.nan, "fewer than 2 samples with a reference")
-        return [dict.fromkeys(("error_mean", "error_sigma", *SHIFTED), nothing) for _ in range(values.shape[1])]
-    errors = [dynamic_errors(values[:, column], reference, rate_hz, segment) for column in range(values.shape[1])]
-    raw = make_units(values - reference[:, None], rate_hz, segment)
-    drawn = resample(raw, options.bootstrap, options.seed)
+    known = np.isfinite(reference)
+    for values in series:
+        known &= np.isfinite(values)
+    cuts, everywhere = known_stretches(known, segment), bool(known.all())
+    truth = Truth.of(reference if everywhere else reference[known], rate_hz, cuts, MOST_DELAY_S)
+    if truth.reference.size < 2:
+        nothing = Reading(math.nan, math.nan, math.nan, truth.note)
+        return [dict.fromkeys(("error_mean", "error_sigma", *SHIFTED), nothing) for _ in range(len(series))]
+    grid = unit_grid(cuts, rate_hz)
+    raw: list[Units] = []
     readings = []
-    for column, error in enumerate(errors):
-        of_error = moments(raw, column, options.bootstrap, options.seed, options.confidence)
+    for values in series:
+        rate = values if everywhere else values[known]
+        units = grid.units_of(rate - truth.reference)
+        of_error = moments(units, 0, options.bootstrap, options.seed, options.confidence)
         row = {"error_mean": of_error["mean"], "error_sigma": of_error["sigma"]}
-        row.update(_shifted(error, rate_hz, options))
-        readings.append(row)
-    for column in range(singles, len(errors)):
+        readings.append(row | _shifted(errors_of(rate, truth), options))
+        raw.append(units)
+    drawn = resample(joined(raw), options.bootstrap, options.seed)
+    for column in range(singles, len(readings)):
         readings[column].update(_factors(readings, drawn, singles, column, options.confidence))
     return readings
 
 
-def _skips(known: np.ndarray) -> np.ndarray:
-    """0 or 1 for each known sample, changing where samples between were left out."""
-    index = np.flatnonzero(known)
-    return np.cumsum(np.diff(index, prepend=index[:1] - 1) > 1) % 2 if index.size else index
-
-
-def _shifted(error: DynamicErrors, rate_hz: float, options: MetricsOptions) -> dict[str, Reading]:
-    if error.note:
+def _shifted(error: DynamicErrors, options: MetricsOptions) -> dict[str, Reading]:
+    if error.sums is None or error.products is None:
         return dict.fromkeys(SHIFTED, Reading(math.nan, math.nan, math.nan, error.note))
-    sums = make_units(np.column_stack([error.aligned, error.scaled]), rate_hz, error.inner_segment)
-    block = sums.block_length(1)
-    gain, delay = _resampled_fit(error, sums, block, options)
+    gain, delay = _resampled_fit(error, error.products, error.sums.block_length(1), options)
     tail = (1 - options.confidence) / 2
     readings = {
-        name: moments(sums, column, options.bootstrap, options.seed, options.confidence)["sigma"]
+        name: moments(error.sums, column, options.bootstrap, options.seed, options.confidence)["sigma"]
         for column, name in enumerate(SHIFTED[:2])
     }
     note = f"gain {error.gain:.6g}"
@@ -80,20 +79,14 @@ def _shifted(error: DynamicErrors, rate_hz: float, options: MetricsOptions) -> d
 
 
 def _resampled_fit(
-    error: DynamicErrors, sums: Units, block: int, options: MetricsOptions
+    error: DynamicErrors, products: np.ndarray, block: int, options: MetricsOptions
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gain and delay [R] of resampled blocks: one Gauss-Newton step from the fit, on the blocks' normal equations."""
-    columns = np.column_stack([np.ones_like(error.shifted), error.shifted, -error.gain * error.slope])
-    products = [columns[:, i] * columns[:, j] for i in range(3) for j in range(3)]
-    products += [columns[:, i] * error.scaled for i in range(3)]
-    at = np.append(0, np.cumsum(sums.count[:-1])).astype(np.int64)
-    units = np.stack([np.add.reduceat(product, at) for product in products], axis=1)
-    running = np.concatenate((np.zeros((1, units.shape[1])), np.cumsum(units, axis=0)))
-    blocks = running[block:] - running[:-block]
-    number = -(-len(units) // block)
-    starts = np.random.default_rng(options.seed).integers(0, len(blocks), (options.bootstrap, number))
-    total = np.stack([blocks[row].sum(axis=0) for row in starts])
-    step = np.linalg.solve(total[:, :9].reshape(-1, 3, 3), total[:, 9:, None])[:, :, 0]
+    number = -(-len(products) // block)
+    starts = np.random.default_rng(options.seed).integers(0, len(products) - block + 1, (options.bootstrap, number))
+    total = block_sums(products, starts, block)
+    matrix = total[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+    step = np.linalg.solve(matrix, total[:, 6:, None])[:, :, 0]
     return error.gain + step[:, 1], error.delay + step[:, 2]
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import numpy as np
 
 ENOUGH_FOR_AUTOCORRELATION = 30
 ENOUGH_FOR_RATIO = 3
 MOST_DIFFERENCES = 2
+LARGEST_RHO = 0.25
 STEPS = (0, -1, -2)
 
 
-def noise_exponents(pieces: list[np.ndarray], factors: np.ndarray) -> np.ndarray:
+def noise_exponents(pieces: list[np.ndarray], factors: np.ndarray, allan: ModuleType) -> np.ndarray:
     """Exponent of the power spectrum at each averaging factor: 2 … -2, never rising with τ.
 
     pieces  : gap-free stretches, arrays [T_s]
-    factors : array [M] int, ascending averaging factors
+    factors : array [M] int, ascending averaging factors;  allan : that module of an engine
     returns : array [M] int
     With 30 block means or more: lag-1 autocorrelation (Riley & Greenhall, "Power law noise identification using the
     lag 1 autocorrelation", EFTF 2004). With fewer: the ratio of the sample variance to the Allan variance (B1, Barnes
@@ -22,15 +25,22 @@ def noise_exponents(pieces: list[np.ndarray], factors: np.ndarray) -> np.ndarray
     steeper one governs the longer τ, so the sequence is made monotone (isotonic regression, weight: block means):
     one chance result among many τ would else multiply its degrees of freedom by ten.
     """
-    raw, weight = np.zeros(len(factors)), np.ones(len(factors))
-    for index, factor in enumerate(factors):
-        blocks = [block_means(piece, int(factor)) for piece in pieces if piece.size >= factor]
-        long = [block for block in blocks if block.size >= ENOUGH_FOR_AUTOCORRELATION]
-        short = [block for block in blocks if block.size >= ENOUGH_FOR_RATIO]
-        weight[index] = max(sum(block.size for block in long or short), 1)
-        if long:
-            raw[index] = exponent_by_autocorrelation(long)
-        elif short:
+    raw, weight = np.zeros(len(factors)), np.zeros(len(factors))
+    squares, products = np.zeros((len(factors), MOST_DIFFERENCES + 1)), np.zeros((len(factors), MOST_DIFFERENCES + 1))
+    for piece in pieces:
+        long = piece.size // factors >= ENOUGH_FOR_AUTOCORRELATION
+        if long.any():
+            of_piece = allan.lag_products(piece, factors[long])
+            squares[long] += of_piece[0]
+            products[long] += of_piece[1]
+            weight[long] += piece.size // factors[long]
+    for index, factor in enumerate(factors.tolist()):
+        if weight[index]:
+            raw[index] = exponent_by_autocorrelation(squares[index], products[index])
+            continue
+        short = [block_means(piece, factor) for piece in pieces if piece.size >= ENOUGH_FOR_RATIO * factor]
+        weight[index] = max(sum(block.size for block in short), 1)
+        if short:
             raw[index] = exponent_by_ratio(short)
         elif index:
             raw[index] = raw[index - 1]
@@ -53,29 +63,22 @@ def _falling(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
 def block_means(series: np.ndarray, length: int) -> np.ndarray:
     """Means of adjacent blocks of `length` samples; an incomplete last block is left out."""
     whole = series.size // length * length
-    return series[:whole].reshape(-1, length).mean(axis=1)
+    return series[:whole].reshape(-1, length).mean(axis=1, dtype=float)
 
 
-def exponent_by_autocorrelation(blocks: list[np.ndarray]) -> float:
-    """Exponent by the lag-1 autocorrelation of block means, differenced until it is small; between -4 and 2."""
-    series = [_without_line(block) for block in blocks]
+def exponent_by_autocorrelation(squares: np.ndarray, products: np.ndarray) -> float:
+    """Exponent by the lag-1 autocorrelation of block means, differenced until it is small; between -4 and 2.
+
+    squares, products : arrays [3] by number of differences, as lag_products of the engines gives them
+    """
     for differences in range(MOST_DIFFERENCES + 1):
-        series = [_centred(block) for block in series]
-        squares = sum(float(block @ block) for block in series)
-        if squares == 0:
+        if squares[differences] == 0:
             return 0.0
-        lag_one = sum(float(block[1:] @ block[:-1]) for block in series) / squares
+        lag_one = float(products[differences] / squares[differences])
         rho = lag_one / (1 + lag_one) if lag_one > -1 else -1.0
-        if rho < 0.25 or differences == MOST_DIFFERENCES:
+        if rho < LARGEST_RHO:
             break
-        series = [np.diff(block) for block in series]
     return float(np.clip(-2 * (rho + differences), -4, 2))
-
-
-def _without_line(values: np.ndarray) -> np.ndarray:
-    position = np.arange(values.size) - (values.size - 1) / 2
-    centred = _centred(values)
-    return centred - position * float(position @ centred) / float(position @ position)
 
 
 def _centred(values: np.ndarray) -> np.ndarray:

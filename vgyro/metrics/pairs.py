@@ -14,7 +14,7 @@ REPLICATES = 50
 
 
 def noise_from_differences(
-    rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = None, engine: str = "reference"
+    rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = None, engine: str = "native"
 ) -> tuple[np.ndarray, np.ndarray]:
     """N deg/s/√Hz (two-sided) and K deg/s/√s of each gyro from the fits to all pairwise differences.
 

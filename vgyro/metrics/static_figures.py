@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vgyro.config import MetricsOptions
-from vgyro.metrics.allan import AllanCurve, allan_deviation, split_segments
-from vgyro.metrics.bootstrap import Resampled, make_units, resample
+from vgyro.metrics.allan import AllanCurve, allan_deviation, split_segments, stretches
+from vgyro.metrics.bootstrap import Resampled, Units, joined, resample, unit_grid
 from vgyro.metrics.coefficients import noise_coefficients
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.improvement import improvement_factor, improvement_of_deviation
@@ -37,18 +38,18 @@ class StaticFigures:
 
 
 def static_figures(
-    values: np.ndarray,
+    series: Iterable[np.ndarray],
     rate_hz: float,
     segment: np.ndarray,
     singles: int,
     filters: list[LowPass],
     options: MetricsOptions,
-    engine: str = "reference",
+    engine: str = "native",
     poses: bool = False,
 ) -> StaticFigures:
-    """Figures of series at rest.
+    """Figures of series at rest, which are taken one by one: only one of them needs to be in memory.
 
-    values  : array [T, S], deg/s; the first `singles` columns are the gyros, the others virtual gyros
+    series  : S arrays [T], deg/s; the first `singles` are the gyros, the others virtual gyros
     segment : array [T] int, number of the stretch at rest and without a gap
     filters : S, what each series went through
     poses   : the stretches are different poses: 1σ is then taken about each pose's own mean, because gravity and
@@ -57,36 +58,35 @@ def static_figures(
     raises  : TooShort if no stretch has three samples
     """
     curves, spectra, readings = [], [], []
-    for column, low_pass in enumerate(filters):
-        series = np.ascontiguousarray(values[:, column])
+    sums: list[Units] = []
+    inside: list[Units] = []
+    grid = unit_grid(stretches(segment), rate_hz)
+    for values, low_pass in zip(series, filters, strict=True):
         curve = allan_deviation(
-            series, rate_hz, None, segment, options.confidence, engine, per_octave=options.taus_per_octave
+            values, rate_hz, None, segment, options.confidence, engine, per_octave=options.taus_per_octave
         )
-        spectrum = spectral_density(series, rate_hz, options.welch_s, segment)
+        spectrum = spectral_density(values, rate_hz, options.welch_s, segment)
         fitted = noise_coefficients(curve, low_pass.bandwidth_hz, low_pass.dc_gain, options.bootstrap, options.seed)
         curves.append(curve)
         spectra.append(spectrum)
         readings.append(paper_readings(curve, spectrum, fitted, rate_hz, low_pass.bandwidth_hz))
-    drawn = _add_moments(readings, values, rate_hz, segment, options, poses)
+        sums.append(grid.units_of(values))
+        if poses:
+            inside.append(grid.units_of(without_means(values, segment)))
+    drawn = _add_moments(readings, joined(sums), joined(inside) if poses else None, options)
     for column in range(singles, len(filters)):
         readings[column].update(_factors(readings, curves, drawn, singles, column, options.confidence))
     return StaticFigures(curves, spectra, readings)
 
 
 def _add_moments(
-    readings: list[dict[str, Reading]],
-    values: np.ndarray,
-    rate_hz: float,
-    segment: np.ndarray,
-    options: MetricsOptions,
-    poses: bool,
+    readings: list[dict[str, Reading]], sums: Units, inside: Units | None, options: MetricsOptions
 ) -> Resampled:
-    sums = make_units(values, rate_hz, segment)
+    """Mean and 1σ, into readings; inside : units of the series without the means of their poses, for 1σ."""
     drawn = resample(sums, options.bootstrap, options.seed)
     for column, row in enumerate(readings):
         row.update(moments(sums, column, options.bootstrap, options.seed, options.confidence))
-    if poses:
-        inside = make_units(without_means(values, segment), rate_hz, segment)
+    if inside is not None:
         for column, row in enumerate(readings):
             sigma = moments(inside, column, options.bootstrap, options.seed, options.confidence)["sigma"]
             row["sigma"] = replace(sigma, note=f"{POSE_NOTE}; {sigma.note}")
@@ -95,8 +95,8 @@ def _add_moments(
 
 
 def without_means(values: np.ndarray, segment: np.ndarray) -> np.ndarray:
-    """values [T, S] with the mean of each stretch taken off."""
-    return np.concatenate([piece - piece.mean(axis=0) for piece in split_segments(values, segment)])
+    """values [T] with the mean of each stretch taken off."""
+    return np.concatenate([piece - piece.mean(dtype=float) for piece in split_segments(values, segment)])
 
 
 def _factors(

@@ -41,7 +41,7 @@ def series_figures(
              the first `gyros` of them are the single gyros
     values : [M, S] deg/s at rate_hz;  stretch : [M] number of the run without a gap
     """
-    found = static_figures(values, rate_hz, stretch, gyros, [LowPass()] * len(names), options, engine)
+    found = static_figures(values.T, rate_hz, stretch, gyros, [LowPass()] * len(names), options, engine)
     metrics = [
         _row(place, name, metric, metric, readings[metric])
         for name, readings in zip(names, found.readings, strict=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import overload
 
 import numpy as np
 
@@ -20,23 +22,47 @@ from vgyro.metrics import (
     correlation_matrix,
     dynamic_figures,
     static_figures,
+    stretches,
     thinned,
 )
 from vgyro.storage.tables import read_columns, write_table
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.rates_file import ArrayFile, read_array
+from vgyro.tasks.rates_file import ArrayFile, chosen_rows, read_array, read_column
 
 SPECTRUM_POINTS = 600
+FEWEST_SAMPLES = 3  # in the longest stretch, for an Allan deviation
 
 
 @dataclass(frozen=True)
 class Series:
-    """One column to measure: what metrics.parquet calls it, and what it went through."""
+    """One column to measure: its file and name there, what metrics.parquet calls it, and what it went through."""
 
+    path: Path
     column: str
     method: str
     definition: str
     low_pass: LowPass
+
+
+@dataclass(frozen=True)
+class Columns(Sequence[np.ndarray]):
+    """The values of some series, each read from its file when it is asked for.  where : samples to take; None: all"""
+
+    series: list[Series]
+    where: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.series)
+
+    @overload
+    def __getitem__(self, index: int) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, index: slice) -> Columns: ...
+    def __getitem__(self, index: int | slice) -> np.ndarray | Columns:
+        if isinstance(index, slice):
+            return Columns(self.series[index], self.where)
+        values = read_column(self.series[index].path, self.series[index].column)
+        return values if self.where is None else values[self.where]
 
 
 def main(task: Task) -> None:
@@ -45,39 +71,40 @@ def main(task: Task) -> None:
     options : board, axis, recording, kind, analysis.metrics, analysis.engine
     """
     options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
-    engine = task.options["analysis"].get("engine", "reference")
-    axis = task.options["axis"]
+    engine = task.options["analysis"].get("engine", "native")
+    axis, rates = task.options["axis"], task.input("rates")
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(axis)]
-    array = read_array(task.input("rates"), gyros, axis)
-    series = [Series(gyro, gyro, "", LowPass()) for gyro in gyros] + fused_series(read_columns(task.input("methods")))
-    fused = read_columns(task.input("fused"), [one.column for one in series[len(gyros) :]])
-    values = np.column_stack([array.rate, *(fused[one.column] for one in series[len(gyros) :])])
+    series = [Series(rates, gyro, gyro, "", LowPass()) for gyro in gyros]
+    series += fused_series(task.input("fused"), read_columns(task.input("methods")))
+    frame = read_array(rates, [], axis)
     curves: dict[str, AllanCurve] = {}
     spectra: dict[str, Spectrum] = {}
     readings: list[dict[str, Reading]] = [{} for _ in series]
-    rest_segment = array.rest_segment()
-    resting = array.at_rest
-    if longest_run(rest_segment) >= 3:
-        poses = task.options["kind"] == "free" and len(np.unique(rest_segment)) > 1
+    resting = frame.at_rest.any()
+    rest = frame.rest_segment()
+    poses = stretches(rest)
+    if max((stop - start for start, stop in poses), default=0) >= FEWEST_SAMPLES:
+        values = Columns(series, None if frame.at_rest.all() else frame.at_rest)
         found = static_figures(
-            values[resting], array.rate_hz, rest_segment, len(gyros), [one.low_pass for one in series], options, engine,
-            poses,
+            values, frame.rate_hz, rest, len(gyros), [one.low_pass for one in series], options, engine,
+            task.options["kind"] == "free" and len(poses) > 1,
         )  # fmt: skip
         names = [one.column for one in series]
         curves, spectra = dict(zip(names, found.curves, strict=True)), dict(zip(names, found.spectra, strict=True))
         readings = found.readings
-    if array.reference is not None:
-        moving = dynamic_figures(values, array.reference, array.rate_hz, array.segment, len(gyros), options)
+    reference = frame.reference
+    if reference is not None:
+        moving = dynamic_figures(Columns(series), reference, frame.rate_hz, frame.segment, len(gyros), options)
         readings = [{**still, **row} for still, row in zip(readings, moving, strict=True)]
     write_tables(task, series, curves, spectra, readings)
-    correlation = noise_correlation(array, rest_segment, options)
+    correlation = noise_correlation(read_array(rates, gyros, axis), rest, reference, options)
     write_table(
         task.output("correlation"), correlation_columns(gyros, correlation), "correlation", task.provenance(),
-        {"of": "samples at rest" if resting.any() else "rate - reference"},
+        {"of": "samples at rest" if resting else "rate - reference"},
     )  # fmt: skip
 
 
-def fused_series(methods: Mapping[str, np.ndarray]) -> list[Series]:
+def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]:
     """The columns of fused.parquet, by methods.parquet; a method that could not run has none."""
     found = []
     for row, column in enumerate(methods["column"]):
@@ -86,26 +113,24 @@ def fused_series(methods: Mapping[str, np.ndarray]) -> list[Series]:
             low_pass = LowPass(
                 bandwidth if math.isfinite(bandwidth) else None, gain if math.isfinite(gain) and gain > 0 else 1.0
             )
-            found.append(
-                Series(str(column), str(methods["method"][row]), str(methods["definition"][row] or ""), low_pass)
-            )
+            method, definition = str(methods["method"][row]), str(methods["definition"][row] or "")
+            found.append(Series(fused, str(column), method, definition, low_pass))
     return found
 
 
-def longest_run(segment: np.ndarray) -> int:
-    """Samples in the longest stretch."""
-    return int(np.max(np.unique(segment, return_counts=True)[1])) if segment.size else 0
-
-
-def noise_correlation(array: ArrayFile, rest_segment: np.ndarray, options: MetricsOptions) -> Correlation:
+def noise_correlation(
+    array: ArrayFile, rest: np.ndarray, reference: np.ndarray | None, options: MetricsOptions
+) -> Correlation:
     """Correlation of the noise at rest; of the errors where the board moves and the true rate is known; else NaN."""
     number = array.rate.shape[1]
-    if array.at_rest.any():
-        return correlation_matrix(array.rate[array.at_rest], array.rate_hz, rest_segment, options.confidence)
-    if array.reference is not None and np.isfinite(array.reference).sum() > number:
-        known = np.isfinite(array.reference)
-        error = array.rate[known] - array.reference[known, None]
-        return correlation_matrix(error, array.rate_hz, array.segment[known], options.confidence)
+    if rest.size:
+        return correlation_matrix(chosen_rows(array.rate, array.at_rest), array.rate_hz, rest, options.confidence)
+    known = np.isfinite(reference) if reference is not None else np.zeros(0, bool)
+    if reference is not None and known.sum() > number:
+        moving = chosen_rows(array.rate, known)
+        return correlation_matrix(
+            moving, array.rate_hz, array.segment[known], options.confidence, truth=reference[known]
+        )
     unknown = np.full((number, number), math.nan)
     return Correlation(unknown, unknown, unknown, unknown)
 

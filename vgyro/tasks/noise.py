@@ -19,11 +19,11 @@ from vgyro.metrics import (
     noise_coefficients,
     noise_from_differences,
     read_curve,
-    without_means,
+    stretches,
 )
 from vgyro.storage.tables import write_json
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.rates_file import ArrayFile, read_array
+from vgyro.tasks.rates_file import ArrayFile, chosen_rows, read_array
 
 ENOUGH_REST_S = 10.0
 LONG_ENOUGH = 30  # samples
@@ -46,7 +46,7 @@ class ArrayNoiseRecord:
 def main(task: Task) -> None:
     """inputs : rates (of the recording to take it from);  outputs : noise;  options : axis, board, analysis.metrics"""
     options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
-    engine = task.options["analysis"].get("engine", "reference")
+    engine = task.options["analysis"].get("engine", "native")
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     path = task.inputs["rates"][0]
     array = read_array(path, gyros, task.options["axis"])
@@ -56,24 +56,18 @@ def main(task: Task) -> None:
 
 def rests_enough(array: ArrayFile) -> bool:
     """Is there rest enough to see the noise in, one stretch of it long enough for an Allan curve?"""
-    lengths = np.unique(array.rest_segment(), return_counts=True)[1]
-    return bool(lengths.sum() >= ENOUGH_REST_S * array.rate_hz and lengths.max() >= LONG_ENOUGH)
+    lengths = [stop - start for start, stop in stretches(array.rest_segment())]
+    return sum(lengths) >= ENOUGH_REST_S * array.rate_hz and max(lengths) >= LONG_ENOUGH
 
 
 def noise_at_rest(array: ArrayFile, options: MetricsOptions, engine: str) -> ArrayNoiseRecord:
-    """From the samples at rest; each stretch's own mean removed."""
+    """From the samples at rest; no difference is taken across their gaps."""
     segment = array.rest_segment()
-    rate = without_means(array.rate[array.at_rest], segment)
+    rate = chosen_rows(array.rate, array.at_rest)
     fits, read = [], []
-    for column in range(rate.shape[1]):
+    for column in rate.T:
         curve = allan_deviation(
-            rate[:, column],
-            array.rate_hz,
-            None,
-            segment,
-            options.confidence,
-            engine,
-            per_octave=options.taus_per_octave,
+            column, array.rate_hz, None, segment, options.confidence, engine, per_octave=options.taus_per_octave
         )
         fits.append(noise_coefficients(curve, replicates=options.bootstrap, seed=options.seed))
         read.append(read_curve(curve, 1.0)[0])

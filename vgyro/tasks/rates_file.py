@@ -55,7 +55,7 @@ def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
         raise DataError("rates without a sample rate", str(path), "run the stage `convert` again")
     file = pq.ParquetFile(path)
     samples = file.metadata.num_rows
-    kind = np.result_type(*(file.schema_arrow.field(gyro).type.to_pandas_dtype() for gyro in gyros))
+    kind = np.result_type(np.float32, *(file.schema_arrow.field(gyro).type.to_pandas_dtype() for gyro in gyros))
     rate = np.empty((len(gyros), samples), dtype=kind)
     segment, at_rest = np.empty(samples, dtype=np.int32), np.empty(samples, dtype=bool)
     first = 0
@@ -77,3 +77,8 @@ def read_column(path: Path, name: str) -> np.ndarray:
         values[first:last] = batch[name]
         first = last
     return values
+
+
+def chosen_rows(rate: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """The rows of rate [T, N] where chosen [T] is true, each column contiguous; not copied if all are."""
+    return rate if chosen.all() else np.stack([column[chosen] for column in rate.T]).T

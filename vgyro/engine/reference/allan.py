@@ -1,4 +1,4 @@
-"""Allan variance, its degrees of freedom and its limits, by allantools.
+"""Allan variance, its degrees of freedom and its limits, by allantools; what tells kinds of noise apart, in NumPy.
 
 allantools works on one gap-free series; pooling over segments is done by the caller (vgyro.metrics.allan).
 """
@@ -11,6 +11,7 @@ from scipy.stats import chi2
 
 STEEPEST = -2  # random walk of the rate: the steepest noise for which the two-sample variance exists
 FLATTEST = 2  # white noise of the angle
+FEWEST_MEANS = 4
 
 
 def second_differences(rate: np.ndarray, rate_hz: float, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -21,6 +22,7 @@ def second_differences(rate: np.ndarray, rate_hz: float, factors: np.ndarray) ->
     returns : sums [M] in (deg/s)², counts [M]; sums / counts is the overlapping Allan variance. Zeros where 2m >= T.
     Riley, NIST SP 1065, eq. 11.
     """
+    rate = np.asarray(rate, dtype=float)
     angle = np.concatenate(([0.0], np.cumsum(rate - rate.mean()))) / rate_hz
     sums, counts = np.zeros(len(factors)), np.zeros(len(factors), dtype=np.int64)
     possible = np.flatnonzero(2 * factors < angle.size - 1)  # allantools leaves out a τ with a single difference
@@ -31,17 +33,45 @@ def second_differences(rate: np.ndarray, rate_hz: float, factors: np.ndarray) ->
     return sums, counts
 
 
-def degrees_of_freedom(alpha: int, factor: int, samples: int) -> float:
-    """Equivalent degrees of freedom of the overlapping Allan variance of one gap-free stretch.
+def lag_products(rate: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Σ z² and Σ z z' of the means z of adjacent blocks of m samples, z' the following mean.
+
+    rate    : array [T], one gap-free stretch;  factors : array [M] int, m; an incomplete last block is left out
+    returns : squares [M, 3], products [M, 3]: of the means about their line, of their differences about the mean
+              difference, of the second differences about theirs. Zeros where there are fewer than four means.
+    """
+    squares, products = np.zeros((len(factors), 3)), np.zeros((len(factors), 3))
+    rate = np.asarray(rate, dtype=float)
+    for row, factor in enumerate(factors):
+        number = rate.size // factor
+        if number < FEWEST_MEANS:
+            continue
+        series = rate[: number * factor].reshape(number, factor).mean(axis=1)
+        position = np.arange(number) - (number - 1) / 2
+        series = series - series.mean()
+        series -= position * float(position @ series) / float(position @ position)
+        for order in range(3):
+            series = series - series.mean()
+            squares[row, order], products[row, order] = series @ series, series[1:] @ series[:-1]
+            series = np.diff(series)
+    return squares, products
+
+
+def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int) -> np.ndarray:
+    """Equivalent degrees of freedom of the overlapping Allan variance of gap-free stretches.
 
     alpha   : exponent of the rate's power spectrum: 0 white, -1 flicker, -2 random walk, 1 and 2 noise of the angle
-    factor  : averaging factor m;  samples : rates in the stretch
+    factor  : averaging factor m;  samples : array [S] of the rates in each stretch
+    returns : array of the shape of `samples`
     Greenhall & Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003.
     """
     alpha = min(max(alpha, STEEPEST), FLATTEST)
-    if alpha == FLATTEST and samples + 1 <= 4 * factor:
-        alpha = 1  # the published formula for white noise of the angle ends here
-    return float(allantools.edf_greenhall(alpha, 2, factor, samples + 1, overlapping=True))
+    edf = []
+    for number in np.ravel(samples).tolist():
+        # The published formula for white noise of the angle ends at 4m.
+        known = 1 if alpha == FLATTEST and number + 1 <= 4 * factor else alpha
+        edf.append(float(allantools.edf_greenhall(known, 2, int(factor), number + 1, overlapping=True)))
+    return np.array(edf).reshape(np.shape(samples))
 
 
 def limits(deviation: np.ndarray, edf: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,111 @@
+"""Allan kernels against allantools, the reference engine and the definition; bits on every path."""
+
+import subprocess
+import sys
+
+import allantools
+import numpy as np
+import pytest
+
+from vgyro.engine.native import allan
+from vgyro.engine.reference import allan as reference
+
+RATE_HZ = 200.0
+
+
+def series(kind: str, samples: int) -> np.ndarray:
+    white = np.random.default_rng(1).standard_normal(samples)
+    walk = np.cumsum(np.random.default_rng(2).standard_normal(samples))
+    return {
+        "white": white,
+        "biased": 300 + white,
+        "drifting": white + 0.01 * walk,
+        "line": white + np.linspace(-50, 50, samples),
+        "single": white.astype(np.float32),
+    }[kind]
+
+
+def factors_of(samples: int) -> np.ndarray:
+    return np.unique(np.geomspace(1, max(samples // 3, 1), 40).astype(np.int64))
+
+
+@pytest.mark.parametrize("kind", ["white", "biased", "drifting", "single"])
+@pytest.mark.parametrize("samples", [3, 4, 5, 11, 2047, 2050, 300_001])
+def test_second_differences_equal_allantools(kind: str, samples: int):
+    rate, factors = series(kind, samples), factors_of(samples)
+    sums, counts = allan.second_differences(rate, RATE_HZ, factors)
+    expected, number = reference.second_differences(rate, RATE_HZ, factors)
+    np.testing.assert_array_equal(counts, number)
+    np.testing.assert_allclose(sums, expected, rtol=1e-12)
+
+
+def test_a_day_at_200_hz_equals_allantools():
+    rate = series("drifting", 17_280_000)
+    factors = np.array([1, 7, 200, 6_350, 1_000_003, 5_760_000])
+    sums, counts = allan.second_differences(rate, RATE_HZ, factors)
+    _, expected, _, number = allantools.oadev(rate, RATE_HZ, "freq", factors / RATE_HZ)
+    np.testing.assert_array_equal(counts, number)
+    np.testing.assert_allclose(np.sqrt(sums / counts), expected, rtol=1e-12)
+
+
+def test_factors_that_do_not_fit_have_no_differences():
+    sums, counts = allan.second_differences(np.arange(10.0) ** 2, 1.0, np.array([4, 5, 100]))
+    np.testing.assert_array_equal(counts, [3, 0, 0])
+    # Means of four of k² rise by 4²·… : θ(k+8) - 2θ(k+4) + θ(k) over 4, from the definition.
+    means = [np.mean(np.arange(k, k + 4.0) ** 2) for k in range(7)]
+    assert sums[0] == pytest.approx(sum((means[k + 4] - means[k]) ** 2 / 2 for k in range(3)), rel=1e-12)
+    assert not sums[1:].any()
+
+
+@pytest.mark.parametrize("kind", ["white", "biased", "drifting", "line", "single"])
+@pytest.mark.parametrize("samples", [4, 13, 5_000, 100_003])
+def test_lag_products_equal_the_reference(kind: str, samples: int):
+    rate, factors = series(kind, samples), np.append(factors_of(samples), samples)
+    squares, products = allan.lag_products(rate, factors)
+    expected_squares, expected_products = reference.lag_products(rate, factors)
+    assert not squares[-1].any()
+    np.testing.assert_allclose(squares, expected_squares, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(products, expected_products, rtol=1e-9, atol=1e-9 * expected_squares.max())
+
+
+def test_constant_series_has_nothing():
+    assert not allan.second_differences(np.full(500, 3.0), 1.0, np.array([1, 10]))[0].any()
+    assert not allan.lag_products(np.full(500, 3.0), np.array([1, 10]))[0].any()
+
+
+@pytest.mark.parametrize("alpha", [-4, -2, -1, 0, 1, 2])
+def test_degrees_of_freedom_equal_allantools(alpha: int):
+    for factor in (1, 2, 5, 20, 33, 34, 100, 101, 12_345, 576_000):
+        samples = factor * np.array([3, 4, 5, 10, 100, 1000]) + np.array([0, -1, 30, 1, 0, 0])
+        np.testing.assert_allclose(
+            allan.degrees_of_freedom(alpha, factor, samples),
+            reference.degrees_of_freedom(alpha, factor, samples),
+            rtol=1e-11,
+        )
+
+
+def test_limits_equal_scipy():
+    deviation, edf = np.array([1.0, 0.3, 2.0]), np.array([1.2, 146.177, 3e7])
+    np.testing.assert_allclose(
+        allan.limits(deviation, edf, 0.95), reference.limits(deviation, edf, 0.95), rtol=1e-9
+    )  # fmt: skip
+
+
+BITS = """
+import numpy as np
+from vgyro.engine.native import allan
+rate = np.random.default_rng(1).standard_normal(2_000_003)
+factors = np.unique(np.geomspace(1, 600_000, 30).astype(np.int64))
+for values in (*allan.second_differences(rate, 200.0, factors), *allan.lag_products(rate, factors)):
+    print(values.tobytes().hex())
+"""
+
+
+def test_same_bits_for_threads_and_instruction_sets(monkeypatch: pytest.MonkeyPatch):
+    found = set()
+    for isa, threads in (("", "1"), ("", "3"), ("baseline", "1"), ("baseline", "2")):
+        monkeypatch.setenv("VGYRO_ISA", isa)
+        monkeypatch.setenv("VGYRO_THREADS", threads)
+        found.add(subprocess.run([sys.executable, "-c", BITS], check=True, capture_output=True, text=True).stdout)
+    assert len(found) == 1
+    assert len(found.pop()) > 1000
