@@ -126,3 +126,8 @@ def test_wrong_shape_and_unknown_engine():
         min_variance_weights(np.ones(3))
     with pytest.raises(EngineError, match="reference"):
         min_variance_weights(np.eye(2), engine="abacus")
+
+
+def test_nnls_route_closed_form():
+    # Expected: uncorrelated gyros weigh as 1/h.
+    np.testing.assert_allclose(nnls_weights(np.diag([1.0, 2.0, 4.0])), np.array([4, 2, 1]) / 7, atol=1e-14)

@@ -1,13 +1,18 @@
-"""The tasks volatility → fuse → crosscheck on a small array, through files."""
+"""The task fuse on a small array, through files, after what the volatility tasks write."""
 
 import json
+import os
+import subprocess
+import sys
+import tracemalloc
 
 import numpy as np
 import pytest
 
-from vgyro.engine.independent import nnls_weights
-from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
-from vgyro.tasks import crosscheck, fuse, series, volatility
+from vgyro.engine import ENGINES
+from vgyro.fusion import blocks
+from vgyro.storage.tables import Provenance, TableWriter, read_columns, read_metadata, write_json, write_table
+from vgyro.tasks import crosscheck, fuse, fusion_inputs, series, volatility
 from vgyro.tasks.common import Task
 
 GYROS = ("g1", "g2", "g3")
@@ -39,14 +44,14 @@ def task_of(folder, inputs, outputs, gyros=GYROS, kind="static", **options):
     )
 
 
-def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True):
+def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True, single=False):
     """Rates of white gyros, the third three times as noisy; a gap after 3/4; their noise record."""
     samples = int(seconds * RATE_HZ)
     time = np.arange(samples) / RATE_HZ
     segment = np.where(np.arange(samples) < 3 * samples // 4, 0, 1).astype(np.int32)
     time = time + 5.0 * segment
     white = np.random.default_rng(7).standard_normal((samples, len(gyros))) * ARW[: len(gyros)] * np.sqrt(RATE_HZ)
-    rate = white + motion * np.sin(time)[:, None]
+    rate = (white + motion * np.sin(time)[:, None]).astype(np.float32 if single else float)
     columns = {"time": time, "segment": segment, "at_rest": np.full(samples, rest)}
     columns |= {gyro: rate[:, index] for index, gyro in enumerate(gyros)}
     write_table(folder / "rates.parquet", columns, "rates", Provenance({}, "", ""), {"rate_hz": RATE_HZ})
@@ -69,10 +74,10 @@ def run_volatility(folder):
         volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, definition=definition))
 
 
-def fuse_in(folder, tables=(), **keywords):
+def fuse_in(folder, tables=(), read=True, **keywords):
     inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "weights": list(tables)}
     fuse.main(task_of(folder, inputs, {"fused": "fused.parquet", "methods": "methods.parquet"}, **keywords))
-    return read_columns(folder / "fused.parquet"), read_columns(folder / "methods.parquet")
+    return [read_columns(folder / name) for name in ("fused.parquet", "methods.parquet") if read]
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +119,84 @@ def test_weights_reach_the_samples_of_their_block(analysed):
         np.testing.assert_allclose(fused["dcc_in_sample[level]"][inside], expected, atol=1e-12)
 
 
+FULL = {**ANALYSIS, "engine": "native", "volatility": {"rate_hz": "full"}}
+
+
+def write_weights(path, time, names, row_group):
+    """Random weights of every sample at `time`, as the volatility stage writes them; returned by model and mode."""
+    rng = np.random.default_rng(3)
+    found = {name: rng.dirichlet(np.ones(len(GYROS)), len(time)) for name in names}
+    extra = {"blocks": [list(name) for name in names], "samples": len(time)}
+    with TableWriter(path, "weights", Provenance({}, "", ""), extra, row_group=row_group) as writer:
+        for name, weights in found.items():
+            sigma = np.full(len(time), np.nan if name[1] == "causal" else 0.1, dtype=np.float32)
+            columns = {"time": time, "sigma": sigma, "status": np.full(len(time), f"status of {name[1]}")}
+            writer.append({**columns, **{f"w_{gyro}": weights[:, place] for place, gyro in enumerate(GYROS)}})
+    return found
+
+
+def test_weights_of_single_samples(tmp_path, monkeypatch):
+    # The series is at the full rate and lacks some samples; row groups, pieces and blocks all end at different places.
+    # Expected: the weights of the row with the sample's time, equal ones where there is none.
+    monkeypatch.setattr(blocks, "PIECE", 256)
+    monkeypatch.setattr(fusion_inputs, "ROW_GROUP", 500)
+    rate, _ = write_inputs(tmp_path)
+    time = read_columns(tmp_path / "rates.parquet")["time"]
+    there = (np.arange(len(time)) % 1700 > 40) & (time < time[-30])
+    (tmp_path / "level").mkdir()
+    names = [("dcc", "in_sample"), ("dcc", "causal"), ("ccc", "in_sample")]
+    found = write_weights(tmp_path / "level/weights.parquet", time[there], names, row_group=300)
+    fused, methods = fuse_in(tmp_path, ["level/weights.parquet"], analysis=FULL)
+    for model, mode in (names[0], names[2]):
+        weights = np.full(rate.shape, 1 / 3)
+        weights[there] = found[model, mode]
+        np.testing.assert_allclose(fused[f"{model}_{mode}[level]"], (rate * weights).sum(axis=1), atol=1e-14)
+    notes = {(m, d): n for m, d, n in zip(methods["method"], methods["definition"], methods["note"], strict=True)}
+    assert notes["dcc_causal", "level"] == "status of causal."
+    assert f"{1 - there.mean():.1%} of the samples" in notes["dcc_in_sample", "level"]
+
+
+def test_both_engines_fuse_alike(analysed):
+    tables = [f"{name}/weights.parquet" for name in DEFINITIONS]
+    native, reference = (fuse_in(analysed, tables, analysis={**ANALYSIS, "engine": name})[0] for name in ENGINES)
+    assert set(native) == set(reference)
+    for name, column in native.items():
+        np.testing.assert_allclose(column, reference[name], rtol=1e-10, atol=1e-12, err_msg=name)
+
+
+def test_same_bytes_for_any_threads_and_instruction_set(analysed, tmp_path):
+    # As the workflow runs it: python -m vgyro.tasks.fuse.
+    tables = [str(analysed / name / "weights.parquet") for name in DEFINITIONS]
+    task = task_of(analysed, {}, {}, analysis={**ANALYSIS, "engine": "native"})
+    written = set()
+    for extra in ({"VGYRO_THREADS": "1"}, {"VGYRO_THREADS": "3"}, {"VGYRO_ISA": "baseline"}):
+        command = [sys.executable, "-m", "vgyro.tasks.fuse", "--input", "rates", str(analysed / "rates.parquet")]
+        command += ["--input", "noise", str(analysed / "noise.json"), "--input", "weights", *tables]
+        command += ["--output", "fused", str(tmp_path / "f.parquet")]
+        command += ["--output", "methods", str(tmp_path / "m.parquet")]
+        subprocess.run([*command, "--options", json.dumps(task.options)], env=os.environ | extra, check=True)
+        written.add((tmp_path / "f.parquet").read_bytes())
+    assert len(written) == 1
+    assert not list(tmp_path.glob(".*")), "the columns' file has no name"
+
+
+def test_memory_of_a_long_recording(tmp_path):
+    # Rates in single precision, segment, rest, numbers of blocks and one fused rate or two: 60 bytes a sample for three
+    # gyros. One more array [T, N] in double precision would add 24.
+    peaks, lengths = [], (400_000, 1_000_000)
+    some = {**FULL, "fusion": {"methods": ["median", "ewma_two_sided", "xue_2012", "dcc_in_sample"]}}
+    for samples in lengths:
+        write_inputs(tmp_path, seconds=samples / RATE_HZ, single=True)
+        time = read_columns(tmp_path / "rates.parquet")["time"]
+        (tmp_path / "level").mkdir(exist_ok=True)
+        write_weights(tmp_path / "level/weights.parquet", time, [("dcc", "in_sample")], row_group=1 << 16)
+        tracemalloc.start()
+        fuse_in(tmp_path, ["level/weights.parquet"], analysis=some, read=False)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert (peaks[1] - peaks[0]) / (lengths[1] - lengths[0]) < 60
+
+
 def test_without_weights(tmp_path):
     write_inputs(tmp_path, seconds=30)
     _, methods = fuse_in(tmp_path)
@@ -151,66 +234,6 @@ def test_motion_takes_the_wider_filter_and_warns(tmp_path):
     assert "bias" in methods["note"][rows["dcc_causal[level]"]]
 
 
-def check_in(folder):
-    tables = {name: [f"{d}/{name}.parquet" for d in DEFINITIONS] for name in ("garch", "dcc", "weights")}
-    inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "fused": ["fused.parquet"],
-              "methods": ["methods.parquet"], "allan": ["allan.parquet"], "series": ["series.parquet"],
-              **tables}  # fmt: skip
-    crosscheck.main(task_of(folder, inputs, {"crosscheck": "crosscheck.parquet"}))
-    return read_columns(folder / "crosscheck.parquet")
-
-
-def write_allan(folder, factor=1.0):
-    # Expected here: NIST SP 1065's estimator by phase data, written out.
-    fused = read_columns(folder / "fused.parquet", ["average", "segment"])
-    total, count = 0.0, 0
-    for number in (0, 1):
-        phase = np.concatenate([[0.0], np.cumsum(fused["average"][fused["segment"] == number])]) / RATE_HZ
-        second = phase[40:] - 2 * phase[20:-20] + phase[:-40]
-        total, count = total + np.sum(second**2), count + len(second)
-    deviation = np.sqrt(total / (2 * 2.0**2 * count)) * factor
-    columns = {"series": ["average"], "tau": [2.0], "deviation": [deviation], "low": [0.0], "high": [1.0], "edf": [9.0]}
-    write_table(folder / "allan.parquet", columns, "allan", Provenance({}, "", ""))
-
-
-def test_crosscheck_passes_on_sound_results(analysed):
-    fuse_in(analysed, [f"{name}/weights.parquet" for name in DEFINITIONS])
-    write_allan(analysed)
-    table = check_in(analysed)
-    kinds = {check.split()[0] for check in table["check"]}
-    assert kinds == {"GARCH", "weights,", "filter,", "Allan"}
-    assert table["passed"].all(), [row for row in zip(*table.values(), strict=True) if not row[-1]]
-    again = check_in(analysed)
-    assert all(np.array_equal(table[name], again[name]) for name in table), "the sample depends on the seed alone"
-
-
-def test_crosscheck_finds_what_is_wrong(analysed, tmp_path):
-    # A result is spoilt in each table; its check, and no other, must fail.
-    for path in analysed.rglob("*"):
-        if path.is_file():
-            (tmp_path / path.relative_to(analysed)).parent.mkdir(exist_ok=True)
-            (tmp_path / path.relative_to(analysed)).write_bytes(path.read_bytes())
-    fuse_in(tmp_path, ["level/weights.parquet"])
-    fused = read_columns(tmp_path / "fused.parquet")
-    fused["jiang_markov"] = fused["jiang_markov"] + 1e-6 * (np.arange(len(fused["time"])) == 100)
-    write_table(tmp_path / "fused.parquet", fused, "fused", Provenance({}, "", ""))
-    write_allan(tmp_path, factor=1.00001)
-    for definition in DEFINITIONS:
-        spoil(tmp_path / definition / "garch.parquet", "garch", "log_likelihood", -0.6)
-        spoil(tmp_path / definition / "weights.parquet", "weights", "w_g2", 1e-6)
-    table = check_in(tmp_path)
-    kinds = np.array([check.split()[0] for check in table["check"]])
-    assert not table["passed"][np.isin(kinds, ["GARCH", "weights,", "Allan"])].any()
-    assert table["passed"][table["series"] == "jiang_markov"].tolist() == [False]
-    assert table["passed"][table["series"] == "jiang_random_walk"].tolist() == [True]
-
-
-def spoil(path, schema, column, change):
-    table = read_columns(path)
-    table[column] = table[column] + change
-    write_table(path, table, schema, Provenance({}, "", ""))
-
-
 def test_crosscheck_without_weights_or_gyros_to_fuse(tmp_path):
     write_inputs(tmp_path, gyros=("g1",), seconds=30)
     fuse_in(tmp_path, gyros=("g1",))
@@ -220,8 +243,3 @@ def test_crosscheck_without_weights_or_gyros_to_fuse(tmp_path):
     inputs |= {"noise": ["noise.json"], "garch": [], "dcc": [], "weights": []}
     crosscheck.main(task_of(tmp_path, inputs, {"crosscheck": "crosscheck.parquet"}, gyros=("g1",)))
     assert len(read_columns(tmp_path / "crosscheck.parquet")["check"]) == 0
-
-
-def test_nnls_route_closed_form():
-    # Expected: uncorrelated gyros weigh as 1/h.
-    np.testing.assert_allclose(nnls_weights(np.diag([1.0, 2.0, 4.0])), np.array([4, 2, 1]) / 7, atol=1e-14)

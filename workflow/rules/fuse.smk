@@ -12,7 +12,7 @@ rule fuse:
     benchmark:
         "results/benchmarks/{dataset}/{recording}/{axis}/fuse.tsv"
     resources:
-        mem_mb=4000,
+        mem_mb=1500,
         runtime=60,
     params:
         options=stage("board", "engine", "volatility", "fusion"),
