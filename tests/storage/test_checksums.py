@@ -7,8 +7,8 @@ import pytest
 from storage_frames import dsp6_frame
 
 from vgyro.board import Board, Checksum
+from vgyro.engine.reference.frames import checksum, verifier
 from vgyro.storage import decode_dump
-from vgyro.storage.checksums import checksum, verifier
 from vgyro.storage.textscan import xor_of
 
 
@@ -91,7 +91,7 @@ def _board(text: str) -> Board:
 
 
 def test_stored_value_in_both_byte_orders():
-    from vgyro.storage.checksums import stored_value
+    from vgyro.engine.reference.frames import stored_value
 
     data = np.frombuffer(struct.pack(">I", 0x01020304), dtype=np.uint8)
     assert stored_value(data, np.array([0]), 4, "big")[0] == 0x01020304

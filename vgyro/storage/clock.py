@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from vgyro.board import Board
-from vgyro.storage.scan import Found
+from vgyro.storage.scan import Content, Found
 from vgyro.storage.selection import CounterRule
 
 HISTORY = 4096  # frames that are remembered to know a block that was sent again
@@ -39,10 +40,13 @@ class Jump(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """Frames of a chunk without the repeated ones, on the recording's clock; `rows`: their places in the chunk."""
+    """Frames of a chunk without the repeated ones, on the recording's clock.
+
+    rows : their places in the chunk; None: all of them
+    """
 
     found: Found
-    rows: np.ndarray
+    rows: np.ndarray | None
     counter: np.ndarray
     time: np.ndarray
     segment: np.ndarray
@@ -73,7 +77,8 @@ class Clock:
     _ticks: int = 0
     _segment: int = 0
     _last: Found | None = None
-    _history: Found | None = None
+    _history: deque[_Sent] = field(default_factory=deque)
+    _remembered: int = 0  # frames in _history
     _lag: int = 0
     _rule: CounterRule | None = field(init=False, default=None)
 
@@ -84,8 +89,9 @@ class Clock:
     def feed(self, found: Found) -> Timed:
         """Place the frames of the next chunk in time."""
         fresh = self._fresh(found)
-        repeated = int(len(fresh) - fresh.sum())
-        kept = found.take(fresh)
+        rows = None if fresh is None else np.flatnonzero(fresh)
+        kept = found if rows is None else found.take(rows, self._rule)
+        repeated = len(found.start) - len(kept.start)
         if not len(kept.start):
             empty = np.empty(0, dtype=np.int64)
             return Timed(kept, empty, empty, empty.astype(np.float64), empty.astype(np.int32), [], repeated)
@@ -95,18 +101,18 @@ class Clock:
             step = self._rule.step if self._rule else 1
             self._first_counter = 0 if kept.counter is None else int(kept.counter[0]) // step
             self._counter, self._first = self._first_counter, False
-        counter = self._counter + np.cumsum(frames)
-        total = self._ticks + np.cumsum(ticks)
-        segment = np.full(len(frames), self._segment, dtype=np.int32)
-        for jump in jumps:
-            segment[jump.row :] += 1
-        self._counter, self._ticks, self._segment = int(counter[-1]), int(total[-1]), int(segment[-1])
-        self._last = kept.take(np.array([len(kept.start) - 1]))
-        if self.board.timestamp:
+        frames[0] += self._counter
+        counter = np.cumsum(frames)
+        segment = _segments(self._segment, jumps, len(counter))
+        self._counter, self._segment = int(counter[-1]), int(segment[-1])
+        self._last = kept.take(np.array([len(kept.start) - 1]), self._rule)
+        if ticks is not None and self.board.timestamp:
+            total = self._ticks + np.cumsum(ticks)
+            self._ticks = int(total[-1])
             time = total * self.board.timestamp.tick_s
         else:
             time = (counter - self._first_counter) / self.rate_hz
-        return Timed(kept, np.flatnonzero(fresh), counter, time, segment, jumps, repeated)
+        return Timed(kept, rows, counter, time, segment, jumps, repeated)
 
     @property
     def measured_rate_hz(self) -> float | None:
@@ -115,34 +121,30 @@ class Clock:
             return None
         return self.in_step_frames / (self.in_step_ticks * self.board.timestamp.tick_s)
 
-    def _steps(self, kept: Found) -> tuple[np.ndarray, np.ndarray, list[Jump]]:
-        """Frames and ticks from each frame to the next, int64 [n] each; the very first frame's are 0."""
-        count = len(kept.start)
-        before = self._before(kept)
-        elapsed = self._elapsed(before)
-        if self._rule is None and elapsed is None:
-            return self._by_bytes(before, count)
-        if self._rule is None or before.counter is None:
+    def _steps(self, kept: Found) -> tuple[np.ndarray, np.ndarray | None, list[Jump]]:
+        """Frames and ticks from the frame before to each, int64 [n] each; the very first frame's are 0."""
+        stamp = _with_last(self._last and self._last.stamp, kept.stamp)
+        elapsed = self._elapsed(stamp)
+        if elapsed is None and kept.counter is not None:
+            frames, jumps = self._by_counter(kept)
+            return frames, None, jumps
+        counter = _with_last(self._last and self._last.counter, kept.counter)
+        if counter is None and elapsed is None:
+            return self._by_bytes(kept)
+        if self._rule is None or counter is None:
             frames, jumps = self._by_stamp(elapsed)
-        elif elapsed is None:
-            frames, jumps = self._by_counter(np.diff(before.counter), before.counter)
         else:
-            frames, jumps = self._by_both(before.counter, elapsed)
-        ticks = np.zeros(len(frames), dtype=np.int64) if elapsed is None else elapsed
-        shift = count - len(frames)
+            frames, jumps = self._by_both(counter, elapsed)
+        shift = len(kept.start) - len(frames)
         jumps = [jump._replace(row=jump.row + shift) for jump in jumps]
-        self._count_in_step(frames, ticks, jumps, shift)
-        return np.insert(frames, 0, [0] * shift), np.insert(ticks, 0, [0] * shift), jumps
+        self._count_in_step(frames, elapsed, jumps, shift)
+        return np.insert(frames, 0, [0] * shift), np.insert(elapsed, 0, [0] * shift), jumps
 
-    def _before(self, kept: Found) -> Found:
-        """The chunk with the last frame of the one before at its head."""
-        return kept if self._last is None else _joined(self._last, kept)
-
-    def _elapsed(self, frames: Found) -> np.ndarray | None:
+    def _elapsed(self, stamp: np.ndarray | None) -> np.ndarray | None:
         """Ticks from each frame to the next, modulo the time stamp's wrap."""
-        if frames.stamp is None or self.board.timestamp is None:
+        if stamp is None or self.board.timestamp is None:
             return None
-        difference = np.diff(frames.stamp)
+        difference = np.diff(stamp)
         wrap = self.board.timestamp.wrap
         return difference if wrap is None else difference % wrap
 
@@ -152,32 +154,49 @@ class Clock:
         self.in_step_frames += int(frames[plain].sum())
         self.in_step_ticks += int(ticks[plain].sum())
 
-    def _by_bytes(self, before: Found, count: int) -> tuple[np.ndarray, np.ndarray, list[Jump]]:
+    def _by_bytes(self, kept: Found) -> tuple[np.ndarray, None, list[Jump]]:
         """Neither counter nor time stamp: damaged bytes stand for as many frames as they could have been."""
-        hole = before.start[1:] - before.stop[:-1]
+        before = kept.stop[kept.breaks - 1]
+        before[0] = kept.start[0] if self._last is None else self._last.stop[0]
+        hole = kept.start[kept.breaks] - before
         lost = np.where(hole > 0, np.maximum(1, np.rint(hole / self.typical_length)), 0).astype(np.int64)
-        shift = count - len(lost)
-        jumps = [Jump(int(i) + shift, LOST, int(lost[i]), True, True) for i in np.flatnonzero(lost)]
-        frames = np.insert(lost + 1, 0, [0] * shift)
-        return frames, np.zeros(count, dtype=np.int64), jumps
+        frames = np.ones(len(kept.start), dtype=np.int64)
+        frames[kept.breaks] += lost
+        if self._last is None:
+            frames[0] = 0
+        jumps = [
+            Jump(int(row), LOST, int(missing), True, True)
+            for row, missing in zip(kept.breaks, lost, strict=True)
+            if missing
+        ]
+        return frames, None, jumps
 
-    def _by_counter(self, difference: np.ndarray, counter: np.ndarray) -> tuple[np.ndarray, list[Jump]]:
+    def _by_counter(self, kept: Found) -> tuple[np.ndarray, list[Jump]]:
         """The counter alone: a gap is as short as it can be; a counter near zero has restarted."""
         rule = self._known_rule()
+        assert kept.counter is not None
+        steps = np.ones(len(kept.start), dtype=np.int64)
+        rows = kept.breaks
+        if self._last is None:
+            steps[0], rows = 0, rows[1:]
+        here, before = kept.counter[rows], kept.counter[rows - 1]
+        if self._last is not None and self._last.counter is not None:
+            before[0] = self._last.counter[0]
         period = rule.modulus // rule.step
-        frames = rule.frames(counter[1:], counter[:-1])
-        self.still += int(np.count_nonzero(difference == 0))
-        frames[difference == 0] = 1
+        frames = rule.frames(here, before)
+        self.still += int(np.count_nonzero(here == before))
+        frames[here == before] = 1
         near_zero = min(NEAR_ZERO, max(2, period // 64))
-        restart = (frames > near_zero) & (counter[1:] // rule.step < near_zero) | (frames < 0)
+        restart = (frames > near_zero) & (here // rule.step < near_zero) | (frames < 0)
         jumps = []
-        for index in np.flatnonzero((frames != 1) | restart):
+        for index in np.flatnonzero((frames != 1) | restart).tolist():
             if restart[index]:
-                jumps.append(Jump(int(index), RESTART, None, False, False))
+                jumps.append(Jump(int(rows[index]), RESTART, None, False, False))
             else:
-                jumps.append(Jump(int(index), LOST, int(frames[index]) - 1, True, True))
+                jumps.append(Jump(int(rows[index]), LOST, int(frames[index]) - 1, True, True))
         frames[restart] = 1
-        return frames, jumps
+        steps[rows] = frames
+        return steps, jumps
 
     def _by_stamp(self, elapsed: np.ndarray | None) -> tuple[np.ndarray, list[Jump]]:
         """The time stamp alone: a gap is as many periods as it lasts."""
@@ -238,21 +257,45 @@ class Clock:
             raise ValueError("the board sends no counter")
         return self._rule
 
-    def _fresh(self, found: Found) -> np.ndarray:
-        """bool [n]: false for a frame that was sent before, alone or in a block: same counter, same bytes."""
-        fresh = np.ones(len(found.start), dtype=bool)
+    def _fresh(self, found: Found) -> np.ndarray | None:
+        """bool [n]: false for a frame that was sent before, alone or in a block: same counter, same bytes.
+
+        None: there is no such frame.
+        """
         key = found.stamp if found.counter is None else found.counter
-        if key is None or not len(fresh):
-            return fresh
-        known = found if self._history is None else _joined(self._history, found)
-        old = len(known.start) - len(fresh)
-        keys = known.stamp if known.counter is None else known.counter
-        if keys is None:
-            return fresh
-        suspects = iter(self._suspects(keys).tolist())
-        raw = known.raw
+        if key is None or not len(key):
+            return None
+        suspects = self._suspects(key, found.breaks)
+        fresh = self._told_apart(key, found.content, suspects) if self._lag or len(suspects) else None
+        self._history.append(_Sent(key, found.content))
+        self._remembered += len(key)
+        while self._remembered - len(self._history[0].key) >= HISTORY:
+            self._remembered -= len(self._history.popleft().key)
+        return fresh
+
+    def _suspects(self, key: np.ndarray, breaks: np.ndarray) -> np.ndarray:
+        """Rows whose counter (or time stamp) does not advance: they may have been sent before."""
+        rows = breaks if self._rule and self._rule.is_long else np.arange(len(key))
+        earlier = key[rows - 1]
+        if self._history:
+            earlier[0] = self._history[-1].key[-1]
+        else:
+            rows, earlier = rows[1:], earlier[1:]
+        if self._rule is None:
+            return rows[key[rows] <= earlier]
+        reach = min(HISTORY * self._rule.step, self._rule.modulus // 2)
+        return rows[(earlier - key[rows]) % self._rule.modulus <= reach]
+
+    def _told_apart(self, key: np.ndarray, content: Content, suspects: np.ndarray) -> np.ndarray:
+        """bool [n]: false for the suspects that were sent before, and for what follows them in the same order."""
+        parts = [*self._history, _Sent(key, content)]
+        keys = np.concatenate([part.key for part in parts])
+        raw = np.concatenate([part.content.rows() for part in parts])
+        old = len(keys) - len(key)
+        fresh = np.ones(len(key), dtype=bool)
+        places = iter((suspects + old).tolist())
         index, lag = old, self._lag
-        suspect = next(suspects, len(keys))
+        suspect = next(places, len(keys))
         while index < len(keys):
             if lag and np.array_equal(raw[index], raw[index - lag]):
                 fresh[index - old] = False
@@ -260,22 +303,31 @@ class Clock:
                 continue
             lag = 0
             while suspect < index:
-                suspect = next(suspects, len(keys))
+                suspect = next(places, len(keys))
             index = suspect
             if index < len(keys):
                 lag = _lag_of(keys, raw, index)
                 index += not lag
         self._lag = lag
-        self._history = known.take(np.arange(max(0, len(keys) - HISTORY), len(keys)))
         return fresh
 
-    def _suspects(self, keys: np.ndarray) -> np.ndarray:
-        """Rows whose counter (or time stamp) does not advance: they may have been sent before."""
-        difference = np.diff(keys)
-        if self._rule is None:
-            return np.flatnonzero(difference <= 0) + 1
-        reach = min(HISTORY * self._rule.step, self._rule.modulus // 2)
-        return np.flatnonzero(-difference % self._rule.modulus <= reach) + 1
+
+class _Sent(NamedTuple):
+    """Frames that were sent: counter or time stamp, and their bytes."""
+
+    key: np.ndarray
+    content: Content
+
+
+def _segments(first: int, jumps: list[Jump], count: int) -> np.ndarray:
+    """Number of each row's stretch, int32; a stretch begins at every jump."""
+    borders = np.array([0, *(jump.row for jump in jumps), count])
+    return np.repeat(np.arange(first, first + len(borders) - 1, dtype=np.int32), np.diff(borders))
+
+
+def _with_last(last: np.ndarray | None, values: np.ndarray | None) -> np.ndarray | None:
+    """The values with those of the frame before at their head, where there is one."""
+    return values if last is None or values is None else np.concatenate([last, values])
 
 
 def _lag_of(keys: np.ndarray, raw: np.ndarray, row: int) -> int:
@@ -285,18 +337,3 @@ def _lag_of(keys: np.ndarray, raw: np.ndarray, row: int) -> int:
     if len(same) and np.array_equal(raw[first + same[-1]], raw[row]):
         return row - first - int(same[-1])
     return 0
-
-
-def _joined(first: Found, second: Found) -> Found:
-    def join(one: np.ndarray | None, other: np.ndarray | None) -> np.ndarray | None:
-        return None if one is None or other is None else np.concatenate([one, other])
-
-    return Found(
-        np.concatenate([first.start, second.start]),
-        np.concatenate([first.stop, second.stop]),
-        np.concatenate([first.damage, second.damage]),
-        np.concatenate([first.raw, second.raw]),
-        join(first.counter, second.counter),
-        join(first.stamp, second.stamp),
-        {},
-    )

@@ -15,15 +15,19 @@ from vgyro.storage.parquetlog import LogReader
 
 
 def decode_dump(
-    paths: str | Path | Sequence[str | Path], board: Board, options: IntegrityOptions | None = None
+    paths: str | Path | Sequence[str | Path],
+    board: Board,
+    options: IntegrityOptions | None = None,
+    engine: str = "native",
 ) -> Frames:
     """Decode the dumps of one recording, in order, as one stream; plain, .gz or .zst.
 
     returns : Frames with counts {channel: [T]}, counter [T], time [T] s, segment [T] and the integrity record
+    engine  : native, or reference (NumPy alone)
     raises  : DataError for a missing or empty file, a file of another board, too few good frames
     """
     paths = [paths] if isinstance(paths, str | Path) else list(paths)
-    reader = DumpReader(paths, board, board.rate_hz, options or IntegrityOptions())
+    reader = DumpReader(paths, board, board.rate_hz, options or IntegrityOptions(), engine=engine)
     frames = gather(reader, board)
     return frames._replace(integrity=reader.integrity)
 
@@ -35,14 +39,16 @@ def open_recording(
     options: IntegrityOptions,
     chunk_bytes: int = CHUNK_BYTES,
     boards: Path = BOARDS,
+    engine: str = "native",
 ) -> Reader:
     """Stream a recording of dumps or Parquet logs.
 
     returns : an iterable of Frames; its `integrity` is set when the last chunk is read
     raises  : DataError for a missing or empty file, a wrong column; while it is read, Refused
     boards  : folder of the boards that are tried when this one does not fit
+    engine  : of the search for the frames of a dump
     """
     rate_hz = recording.rate_hz or board.rate_hz
     if recording.parquet is not None:
         return LogReader(paths, recording.parquet, board, rate_hz, options)
-    return DumpReader(paths, board, rate_hz, options, chunk_bytes, boards)
+    return DumpReader(paths, board, rate_hz, options, chunk_bytes, boards, engine)

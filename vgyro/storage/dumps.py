@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
 from vgyro.board import BinaryFrame, Board
 from vgyro.config import IntegrityOptions
 from vgyro.storage.clock import LOST, PAUSE, Clock, Timed
@@ -38,6 +36,7 @@ class DumpReader:
     options: IntegrityOptions
     chunk_bytes: int = CHUNK_BYTES
     boards: Path = BOARDS
+    engine: str = "native"
     integrity: Integrity | None = None
 
     def __post_init__(self) -> None:
@@ -48,13 +47,13 @@ class DumpReader:
         self._stop = 0  # end of the last good frame
         self._time: float | None = None  # of the last kept frame
         self._segment = 0
-        self._watches = channel_watches(self.board)
+        self._watches = channel_watches(self.board, engine=self.engine)
 
     def __iter__(self) -> Iterator[Frames]:
         """Decode chunk by chunk.  raises : Refused"""
         seen = probe(self._sources, self.board)
         self._probe = seen
-        scanner = scanner_of(self.board, seen.typical_length)
+        scanner = scanner_of(self.board, seen.typical_length, self.engine)
         self._clock = Clock(self.board, self.rate_hz, seen.period_ticks, seen.typical_length)
         self._length = seen.typical_length
         for block in self._sources.chunks(self.chunk_bytes):
@@ -79,11 +78,15 @@ class DumpReader:
 
     def _note(self, found: Found, timed: Timed) -> None:
         """Damaged bytes before each frame, and gaps in time."""
-        before = np.insert(found.stop[:-1], 0, self._stop)
-        jumps = {int(timed.rows[jump.row]): jump for jump in timed.jumps}
-        holes = np.flatnonzero(found.start > before).tolist()
-        for row in sorted({*holes, *jumps}):
-            start, stop = int(before[row]), int(found.start[row])
+        rows = timed.rows
+        jumps = {jump.row if rows is None else int(rows[jump.row]): jump for jump in timed.jumps}
+        ends = found.stop[found.breaks - 1]
+        ends[0] = self._stop
+        starts = found.start[found.breaks]
+        before = dict(zip(found.breaks[starts > ends].tolist(), ends[starts > ends].tolist(), strict=True))
+        for row in sorted({*before, *jumps}):
+            stop = int(found.start[row])
+            start = before.get(row, stop)
             jump = jumps.get(row)
             lost = (jump.lost or 0) if jump else 0
             if stop > start:

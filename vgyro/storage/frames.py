@@ -57,7 +57,7 @@ def empty_frames(board: Board) -> Frames:
     return Frames(counts, np.empty(0, np.int64), np.empty(0, np.float64), np.empty(0, np.int32))
 
 
-def channel_watches(board: Board, rates: bool = False) -> dict[str, ChannelWatch]:
+def channel_watches(board: Board, rates: bool = False, engine: str = "native") -> dict[str, ChannelWatch]:
     """A watch for every gyro and temperature channel; rails by the converter, else by the gyro's range."""
     watches = {}
     adc = None if rates else board.adc
@@ -67,8 +67,8 @@ def channel_watches(board: Board, rates: bool = False) -> dict[str, ChannelWatch
             reach = gyro.range_deg_s / (1.0 if rates else gyro.scale)
             middle = 0.0 if rates else gyro.bias
             low, high = middle - reach, middle + reach
-        watches[gyro.field] = ChannelWatch(low, high)
+        watches[gyro.field] = ChannelWatch(low, high, engine)
     for temperature in board.temperatures:
         low, high = (-np.inf, np.inf) if adc is None else (float(adc.low), float(adc.high))
-        watches.setdefault(temperature.field, ChannelWatch(low, high))
+        watches.setdefault(temperature.field, ChannelWatch(low, high, engine))
     return watches

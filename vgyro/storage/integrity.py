@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from vgyro import engine as engines
 from vgyro.errors import DataError
 
 MAX_ENTRIES = 1000  # of damage and of gaps in the record; the rest is counted
@@ -158,6 +159,7 @@ class ChannelWatch:
 
     low: float
     high: float
+    engine: str = "native"
     samples: int = 0
     clipped: int = 0
     stuck_start: float = 0.0
@@ -165,22 +167,22 @@ class ChannelWatch:
     _value: Any = None
     _since: float = 0.0
 
+    def __post_init__(self) -> None:
+        self._longest_run = engines.get(self.engine).frames.longest_run
+
     def feed(self, values: np.ndarray, time: np.ndarray) -> None:
         """Take the next samples."""
         if not len(values):
             return
         self.samples += len(values)
-        self.clipped += int(np.count_nonzero((values <= self.low) | (values >= self.high)))
-        first = np.insert(np.flatnonzero(values[1:] != values[:-1]) + 1, 0, 0)
-        last = np.append(first[1:], len(values)) - 1
-        began = time[first]
-        if self._value is not None and values[0] == self._value:
-            began[0] = self._since
-        duration = time[last] - began
-        longest = int(np.argmax(duration))
-        if duration[longest] > self.stuck_duration:
-            self.stuck_start, self.stuck_duration = float(began[longest]), float(duration[longest])
-        self._value, self._since = values[-1], float(began[-1])
+        if np.fmin.reduce(values) <= self.low or np.fmax.reduce(values) >= self.high:
+            self.clipped += int(np.count_nonzero((values <= self.low) | (values >= self.high)))
+        goes_on = self._value is not None and values[0] == self._value
+        since = self._since if goes_on else float(time[0])
+        run, self._since = self._longest_run(values, time, since, self.stuck_duration)
+        if run is not None:
+            self.stuck_start, self.stuck_duration = run
+        self._value = values[-1]
 
     def record(self) -> ChannelRecord:
         """The channel's entry."""

@@ -7,10 +7,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from vgyro import engine as engines
 from vgyro.board import BinaryFrame, Board
-from vgyro.storage.checksums import verifier
-from vgyro.storage.layout import kept_channels, read_channels
-from vgyro.storage.selection import STRAY_FRAMES, CounterRule, alone, select, strays
+from vgyro.storage.layout import columns_of, kept_channels
+from vgyro.storage.selection import STRAY_FRAMES, CounterRule, breaks_of, last_alone, select, strays
 
 # A buffer with overlapping candidates and no lone one is held back so far, then decided as it stands.
 MAX_HELD = 1 << 26
@@ -18,34 +18,53 @@ MAX_HELD = 1 << 26
 NO_SYNC, BAD_CHECKSUM, INVALID = 0, 1, 2
 
 
+class Content(NamedTuple):
+    """The bytes of frames, to tell a repeated one: row k is buffer[places[k]:][:length]. Not copied until asked for."""
+
+    buffer: np.ndarray
+    places: np.ndarray
+    length: int
+
+    def rows(self) -> np.ndarray:
+        """uint8 [n, length]"""
+        if not len(self.places):
+            return np.empty((0, self.length), dtype=np.uint8)
+        return np.lib.stride_tricks.sliding_window_view(self.buffer, self.length)[self.places]
+
+
 class Found(NamedTuple):
     """Good frames of one chunk, in order.
 
     start, stop : int64 [n], offsets in the stream, [start, stop)
     damage      : uint8 [n], worst thing seen between the frame before and this one (NO_SYNC, BAD_CHECKSUM, INVALID)
-    raw         : uint8 [n, m], the frame's content, to tell a repeated frame
+    content     : to tell a repeated frame
     counter     : int64 [n] as sent, or None;  stamp : int64 [n] as sent, or None
     channels    : channel → [n], all but the raw counter
+    breaks      : rows that do not begin where the one before ends, or whose counter does not follow, and row 0
     """
 
     start: np.ndarray
     stop: np.ndarray
     damage: np.ndarray
-    raw: np.ndarray
+    content: Content
     counter: np.ndarray | None
     stamp: np.ndarray | None
     channels: dict[str, np.ndarray]
+    breaks: np.ndarray
 
-    def take(self, index: np.ndarray) -> Found:
+    def take(self, index: np.ndarray, rule: CounterRule | None) -> Found:
         """The frames of an index or a mask."""
+        start, stop = self.start[index], self.stop[index]
+        counter = None if self.counter is None else self.counter[index]
         return Found(
-            self.start[index],
-            self.stop[index],
+            start,
+            stop,
             self.damage[index],
-            self.raw[index],
-            None if self.counter is None else self.counter[index],
+            self.content._replace(places=self.content.places[index]),
+            counter,
             None if self.stamp is None else self.stamp[index],
             {name: values[index] for name, values in self.channels.items()},
+            breaks_of(start, stop, counter, rule),
         )
 
 
@@ -76,6 +95,7 @@ class BinaryScanner:
     """Frames of fixed length: sync, constants and checksum must be right; overlaps are resolved by `select`."""
 
     board: Board
+    engine: str = "native"
     typical_length: float = 0
     _buffer: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
     _base: int = 0
@@ -89,33 +109,28 @@ class BinaryScanner:
         if not isinstance(frame, BinaryFrame):
             raise TypeError(f"board {self.board.name!r} sends text")
         self._frame = frame
-        self._verify = verifier(frame)
-        self.typical_length = frame.length
-        self._pattern = [(place, value) for place, value in enumerate(bytes.fromhex(frame.sync))]
-        for offset, text in frame.constants.items():
-            self._pattern += [(offset + place, value) for place, value in enumerate(bytes.fromhex(text))]
-        self._channels = kept_channels(self.board)
-        counter = self.board.counter
+        self.typical_length = self._length = frame.length
+        self._kernels = engines.get(self.engine).frames
+        self._finder = self._kernels.Finder(frame)
+        counter, stamp = self.board.counter, self.board.timestamp
         self._rule = CounterRule(counter.step, counter.modulus) if counter else None
+        self._kept = kept_channels(self.board)
+        self._columns = columns_of(frame, self._kept)
+        self._counter_column = columns_of(frame, [counter.field] if counter else [])
+        self._stamp_column = columns_of(frame, [stamp.field] if stamp else [])
 
     def feed(self, data: bytes, last: bool = False) -> Found:
         """Take the next bytes; return the frames that are certain by now."""
-        self._buffer = np.concatenate([self._buffer, np.frombuffer(data, dtype=np.uint8)])
-        length = self._frame.length
+        fresh = np.frombuffer(data, dtype=np.uint8)
+        self._buffer = np.concatenate([self._buffer, fresh]) if len(self._buffer) else fresh
         end = self._base + len(self._buffer)
-        places = self._sync_places()
-        good = self._verify(self._buffer, places)
+        places, failed = self._finder.find(self._buffer)
         # What is still in the buffer is judged again, so only older failures are kept.
         known = self._failed[: np.searchsorted(self._failed, self._base)]
-        self._failed = np.concatenate([known, self._base + places[~good]])
-        places = places[good]
+        self._failed = np.concatenate([known, self._base + failed])
         start = self._base + places
-        if len(places):
-            frames = np.lib.stride_tricks.sliding_window_view(self._buffer, length)[places]
-        else:
-            frames = np.empty((0, length), dtype=np.uint8)
         settled, keep_from = self._settled(start, end, last)
-        found = self._emit(start, frames, settled, last or settled == len(start))
+        found = self._emit(start, settled, last or settled == len(start))
         if last:
             self._tail = self._rest(end)
         self._keep(keep_from)
@@ -127,23 +142,10 @@ class BinaryScanner:
 
     def _rest(self, end: int) -> Tail:
         damage = BAD_CHECKSUM if np.any(self._failed >= self._done) else NO_SYNC
-        rest = self._buffer[max(0, self._done - self._base, len(self._buffer) - self._frame.length + 1) :].tobytes()
+        rest = self._buffer[max(0, self._done - self._base, len(self._buffer) - self._length + 1) :].tobytes()
         sync = bytes.fromhex(self._frame.sync)
         broken_off = any(sync.startswith(rest[place : place + len(sync)]) for place in range(len(rest)))
         return Tail(self._done, end, damage, broken_off)
-
-    def _sync_places(self) -> np.ndarray:
-        """Offsets in the buffer where a whole frame with the right sync and constants could stand."""
-        room = len(self._buffer) - self._frame.length + 1
-        if room <= 0:
-            return np.empty(0, dtype=np.int64)
-        match = np.ones(room, dtype=bool)
-        for place, value in self._pattern[:2]:
-            match &= self._buffer[place : place + room] == value
-        places = np.flatnonzero(match)
-        for place, value in self._pattern[2:]:
-            places = places[self._buffer[places + place] == value]
-        return places
 
     def _settled(self, start: np.ndarray, end: int, last: bool) -> tuple[int, int]:
         """How many candidates can be decided now, and the stream offset that must be kept for the rest.
@@ -151,7 +153,7 @@ class BinaryScanner:
         The cut is just before a candidate that overlaps nothing, also nothing that may still come: every choice
         takes it, so what lies before it can be decided without what lies behind.
         """
-        length = self._frame.length
+        length = self._length
         if last:
             return len(start), end
         waiting = end - length + 1
@@ -159,58 +161,74 @@ class BinaryScanner:
             return 0, waiting
         if start[-1] + (STRAY_FRAMES + 2) * length < end or len(self._buffer) > MAX_HELD:
             return len(start), max(waiting, int(start[-1]) + length)
-        certain = np.flatnonzero(alone(start, length) & (start <= end - 2 * length + 1))
-        if not len(certain):
+        certain = last_alone(start, length, end - 2 * length + 1)
+        if certain is None:
             return 0, min(waiting, int(start[0]))
-        return int(certain[-1]), int(start[certain[-1]])
+        return certain, int(start[certain])
 
-    def _emit(self, start: np.ndarray, frames: np.ndarray, settled: int, final: bool) -> Found:
+    def _emit(self, start: np.ndarray, settled: int, final: bool) -> Found:
         """The first `settled` candidates without those that overlap better ones and those that are there by chance."""
-        counter = self._counter(frames)
-        chosen = select(start, self._frame.length, counter, self._rule)[:settled]
+        counter, rule = self._read(start, self._counter_column), self._rule
+        step, modulus = (rule.step, rule.modulus) if rule else (0, 0)
+        breaks = self._kernels.breaks(start, self._length, counter, step, modulus)
         following = settled < len(start) and not final
-        index = np.flatnonzero(np.append(chosen, True) if following else chosen)
-        if counter is not None and self._rule is not None:
-            stray = self._strays(start[index], counter[index])
+        apart = start[breaks[1:]] - start[breaks[1:] - 1]
+        if np.any(apart < self._length):
+            chosen = select(start, self._length, counter, rule)[:settled]
+            index = np.flatnonzero(np.append(chosen, True) if following else chosen)
+            start, counter = start[index], None if counter is None else counter[index]
+            breaks = self._kernels.breaks(start, self._length, counter, step, modulus)
         else:
-            stray = np.zeros(len(index), dtype=bool)
+            seen = settled + following
+            start, counter = start[:seen], None if counter is None else counter[:seen]
+            breaks = breaks[: np.searchsorted(breaks, seen)]
+        stray = self._strays(start, counter, breaks)
         if following:
-            index, stray = index[:-1], stray[:-1]
-        if len(index):
-            final_counter = 0 if counter is None else int(counter[index[-1]])
-            self._previous = (int(start[index[-1]]), final_counter)
-        if stray.any():
-            self._failed = np.union1d(self._failed, start[index[stray]])
-        return self._found(start[index[~stray]], frames[index[~stray]])
-
-    def _strays(self, start: np.ndarray, counter: np.ndarray) -> np.ndarray:
-        length, rule = self._frame.length, self._rule
-        if rule is None:
-            raise TypeError("strays are told by their counter")
-        if self._previous is None:
-            return strays(start, length, counter, rule)
-        with_previous = np.insert(start, 0, self._previous[0]), np.insert(counter, 0, self._previous[1])
-        return strays(with_previous[0], length, with_previous[1], rule)[1:]
-
-    def _found(self, start: np.ndarray, frames: np.ndarray) -> Found:
-        stop = start + self._frame.length
-        before = np.insert(stop[:-1], 0, self._done) if len(start) else stop
-        failures = np.searchsorted(self._failed, start) - np.searchsorted(self._failed, before)
-        damage = np.where(failures > 0, BAD_CHECKSUM, NO_SYNC).astype(np.uint8)
+            start, counter = start[:-1], None if counter is None else counter[:-1]
+            stray, breaks = stray[stray < len(start)], breaks[: np.searchsorted(breaks, len(start))]
         if len(start):
-            self._done = int(stop[-1])
-        stamp = None
-        if self.board.timestamp:
-            stamp = read_channels(frames, self._frame, [self.board.timestamp.field])[self.board.timestamp.field]
-            stamp = stamp.astype(np.int64)
-        channels = read_channels(frames, self._frame, self._channels)
-        return Found(start, stop, damage, frames, self._counter(frames), stamp, channels)
+            self._previous = int(start[-1]), 0 if counter is None else int(counter[-1])
+        if len(stray):
+            self._failed = np.union1d(self._failed, start[stray])
+            start, counter = np.delete(start, stray), None if counter is None else np.delete(counter, stray)
+            breaks = self._kernels.breaks(start, self._length, counter, step, modulus)
+        return self._found(start, counter, breaks)
 
-    def _counter(self, frames: np.ndarray) -> np.ndarray | None:
-        if self.board.counter is None:
+    def _strays(self, start: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> np.ndarray:
+        """Rows that are frames by chance; only beside a break can one be."""
+        if counter is None or self._rule is None or not len(start):
+            return np.empty(0, dtype=np.int64)
+        rows = np.unique(np.concatenate([breaks, breaks[1:] - 1]))
+        return strays(start, self._length, counter, self._rule, rows, self._previous)
+
+    def _found(self, start: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> Found:
+        stop = start + self._length
+        damage = np.zeros(len(start), dtype=np.uint8)
+        if len(start):
+            before = stop[breaks - 1]
+            before[0] = self._done
+            failures = np.searchsorted(self._failed, start[breaks]) - np.searchsorted(self._failed, before)
+            damage[breaks[failures > 0]] = BAD_CHECKSUM
+            self._done = int(stop[-1])
+        places = start - self._base
+        channels = self._kernels.read_columns(self._buffer, places, self._length, self._columns)
+        return Found(
+            start,
+            stop,
+            damage,
+            Content(self._buffer, places, self._length),
+            counter,
+            self._read(start, self._stamp_column),
+            dict(zip(self._kept, channels, strict=True)),
+            breaks,
+        )
+
+    def _read(self, start: np.ndarray, columns: list) -> np.ndarray | None:
+        """Counter or time stamp of frames, int64 [n]; None for a board without."""
+        if not columns:
             return None
-        name = self.board.counter.field
-        return read_channels(frames, self._frame, [name])[name].astype(np.int64)
+        (values,) = self._kernels.read_columns(self._buffer, start - self._base, self._length, columns)
+        return values.astype(np.int64)
 
     def _keep(self, keep_from: int) -> None:
         keep_from = max(keep_from, self._base)

@@ -18,6 +18,11 @@ class CounterRule:
     step: int
     modulus: int
 
+    @property
+    def is_long(self) -> bool:
+        """Whether a step forward is shorter than the way back."""
+        return self.modulus > 2 * self.step
+
     def frames(self, later: np.ndarray, earlier: np.ndarray) -> np.ndarray:
         """Frames from `earlier` to `later`, modulo the counter's wrap; -1 where the counter is between two steps."""
         difference = (later - earlier) % self.modulus
@@ -31,6 +36,32 @@ def alone(start: np.ndarray, length: int) -> np.ndarray:
     result[1:] &= apart
     result[:-1] &= apart
     return result
+
+
+def last_alone(start: np.ndarray, length: int, limit: int) -> int | None:
+    """The last candidate that begins at or before `limit` and overlaps no other; None if there is none."""
+    seen = 16
+    while True:
+        # One more than is asked, for the neighbour of the first.
+        begin = max(0, len(start) - seen)
+        part = start[max(0, begin - 1) :]
+        lone = alone(part, length) & (part <= limit)
+        lone[: begin - max(0, begin - 1)] = False
+        rows = np.flatnonzero(lone)
+        if len(rows):
+            return max(0, begin - 1) + int(rows[-1])
+        if not begin:
+            return None
+        seen *= 16
+
+
+def breaks_of(start: np.ndarray, stop: np.ndarray, counter: np.ndarray | None, rule: CounterRule | None) -> np.ndarray:
+    """Rows that do not begin where the one before ends, or whose counter is not a step further; row 0 is among them."""
+    follows = start[1:] == stop[:-1]
+    if counter is not None and rule is not None:
+        difference = np.diff(counter)
+        follows &= (difference == rule.step) | (difference == rule.step - rule.modulus)
+    return np.flatnonzero(np.insert(~follows, 0, True)) if len(start) else np.empty(0, dtype=np.int64)
 
 
 def select(start: np.ndarray, length: int, counter: np.ndarray | None, rule: CounterRule | None) -> np.ndarray:
@@ -94,20 +125,27 @@ def _links(
     return links
 
 
-def strays(start: np.ndarray, length: float, counter: np.ndarray, rule: CounterRule) -> np.ndarray:
-    """True for a candidate whose checksum holds by chance: it stands where its neighbours need another frame.
+def strays(
+    start: np.ndarray,
+    length: float,
+    counter: np.ndarray,
+    rule: CounterRule,
+    rows: np.ndarray,
+    previous: tuple[int, int] | None = None,
+) -> np.ndarray:
+    """Which of `rows` are candidates whose checksum holds by chance: they stand where their neighbours need another.
 
-    start, counter : int64 [n], of chosen frames in order
-    returns        : bool [n]; the first and the last are never strays, for lack of a neighbour
+    start, counter : int64 [n], of chosen frames in order;  previous : start and counter of the frame before them
+    returns        : int64, rows in order; the first and the last frame are never strays, for lack of a neighbour
     Its neighbours agree with each other and with the bytes between them, and its counter is not between theirs.
     """
-    result = np.zeros(len(start), dtype=bool)
-    if len(start) < 3:
-        return result
-    apart = start[2:] - start[:-2]
+    rows = rows[(rows < len(start) - 1) & (rows >= (1 if previous is None else 0))]
+    start_before, counter_before = start[rows - 1], counter[rows - 1]
+    if previous is not None:
+        start_before[rows == 0], counter_before[rows == 0] = previous
+    apart = start[rows + 1] - start_before
     expected = np.rint(apart / length)
-    whole = rule.frames(counter[2:], counter[:-2])
-    first = rule.frames(counter[1:-1], counter[:-2])
+    whole = rule.frames(counter[rows + 1], counter_before)
+    first = rule.frames(counter[rows], counter_before)
     near = (apart <= STRAY_FRAMES * length) & (whole >= expected) & (whole <= expected + STRAY_FRAMES)
-    result[1:-1] = near & (whole <= rule.modulus // rule.step // 2) & ((first < 0) | (first > whole))
-    return result
+    return rows[near & (whole <= rule.modulus // rule.step // 2) & ((first < 0) | (first > whole))]

@@ -47,9 +47,11 @@ class Sniffed(NamedTuple):
     rate_hz: float | None
 
 
-def scanner_of(board: Board, typical_length: float = 0) -> Scanner:
-    """The scanner for a board's frames."""
-    return BinaryScanner(board) if isinstance(board.layout, BinaryFrame) else TextScanner(board, typical_length)
+def scanner_of(board: Board, typical_length: float = 0, engine: str = "native") -> Scanner:
+    """The scanner for a board's frames. engine : of the search for binary ones"""
+    if isinstance(board.layout, BinaryFrame):
+        return BinaryScanner(board, engine)
+    return TextScanner(board, typical_length)
 
 
 def probe(sources: Sources, board: Board) -> Probe:

@@ -11,8 +11,10 @@ import pyarrow as pa
 import pyarrow.csv
 
 from vgyro.board import Board, TextFrame
-from vgyro.storage.layout import DTYPES, channel_types, kept_channels
-from vgyro.storage.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Found, Tail
+from vgyro.engine.frames import DTYPES
+from vgyro.storage.layout import channel_types, kept_channels
+from vgyro.storage.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Content, Found, Tail
+from vgyro.storage.selection import CounterRule, breaks_of
 
 BLANK = b"\r\n \t\0"
 NEWLINE = b"\n"
@@ -135,11 +137,14 @@ class TextScanner:
         rest = self._worst(self._done, 1 << 62, b"", spoilt, invalid, self._damage)
         self._damage = rest
         values = {name: column[good] for name, column in values.items()}
-        raw = np.ascontiguousarray(np.column_stack([column.astype(np.float64) for column in values.values()]))
+        raw = np.column_stack([column.astype(np.float64) for column in values.values()])
+        content = Content(raw.reshape(-1).view(np.uint8), np.arange(len(raw)) * raw.strides[0], raw.strides[0])
         counter = values[self.board.counter.field].astype(np.int64) if self.board.counter else None
         stamp = values[self.board.timestamp.field].astype(np.int64) if self.board.timestamp else None
         channels = {name: values[name] for name in kept_channels(self.board)}
-        return Found(start, stop, damage, raw.view(np.uint8), counter, stamp, channels)
+        rule = CounterRule(self.board.counter.step, self.board.counter.modulus) if self.board.counter else None
+        breaks = breaks_of(start, stop, counter, rule)
+        return Found(start, stop, damage, content, counter, stamp, channels, breaks)
 
     def _worst(self, begin: int, end: int, text: bytes, spoilt: np.ndarray, invalid: np.ndarray, known: int) -> int:
         worst = known

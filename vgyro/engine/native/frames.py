@@ -1,0 +1,100 @@
+"""Frames of a serial dump in C: synchronisation, checksums, columns, runs. One pass, for any binary layout."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vgyro.board import TYPE_BYTES, BinaryFrame
+from vgyro.engine.checksums import crc_tables
+from vgyro.engine.frames import DTYPES, Candidates, Column, Run, fixed_bytes
+from vgyro.engine.native import _frames
+
+ROOM = 1 << 12
+"""Candidates, beyond those of a dump of whole frames, for which there is room at first."""
+FAMILIES = {"none": _frames.NO_CHECKSUM, "crc": _frames.CRC, "sum": _frames.SUM}
+
+
+class Finder:
+    """Candidates of one frame layout. A place counts if sync, constants and checksum are right, wherever it lies."""
+
+    def __init__(self, frame: BinaryFrame) -> None:
+        rule, fixed = frame.checksum, fixed_bytes(frame)
+        first, last = rule.span or (0, 0)
+        zeros, tables = crc_tables(rule, last - first) if rule.family == "crc" else (0, np.zeros(1, dtype=np.uint8))
+        self._length = frame.length
+        self._layout = _frames.Layout(
+            frame.length,
+            np.array([value for _, value in fixed], dtype=np.uint8),
+            np.array([place for place, _ in fixed], dtype=np.int64),
+            FAMILIES[rule.family if rule.span else "none"],
+            rule.width // 8,
+            tables.reshape(-1).view(np.uint8),
+            zeros,
+            rule.equals or 0,
+            -1 if rule.at is None else rule.at,
+            first,
+            last,
+            (rule.byte_order or frame.byte_order) == "big",
+        )
+
+    def find(self, buffer: np.ndarray) -> Candidates:
+        """Good and failed candidates of a buffer, uint8 [m]."""
+        good, failed, place = [], [], 0
+        room = len(buffer) // self._length + ROOM
+        while place < len(buffer):
+            whole, broken = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+            wholes, brokens, place = self._layout.find(buffer, place, whole, broken)
+            good.append(whole[:wholes])
+            failed.append(broken[:brokens])
+        return Candidates(_joined(good), _joined(failed))
+
+
+def read_columns(buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[Column]) -> list[np.ndarray]:
+    """Values of channels of the frames of `length` bytes that begin at `places`, each [n], in the channel's own type.
+
+    buffer : uint8 [m];  places : int64 [n]
+    """
+    read = [np.empty(len(places), dtype=DTYPES[column.kind]) for column in columns]
+    if not len(places):
+        return read
+    if places.min() < 0 or places.max() + length > len(buffer):
+        raise IndexError(f"frames of {length} bytes do not lie in a buffer of {len(buffer)}")
+    wanted = [
+        (column.at, TYPE_BYTES[column.kind], column.order == "big", column.kind[0] == "i", values.view(np.uint8))
+        for column, values in zip(columns, read, strict=True)
+    ]
+    _frames.columns(buffer, places, wanted)
+    return read
+
+
+def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int, modulus: int) -> np.ndarray:
+    """Rows that do not follow the one before: int64, ascending, row 0 always among them.
+
+    start   : int64 [n], offsets of frames of `length` bytes;  counter : int64 [n] as sent, or None
+    A row follows if it begins where the other ends and its counter is `step` more, modulo `modulus`.
+    """
+    rows = np.empty(len(start), dtype=np.int64)
+    if len(start):
+        rows = rows[: _frames.breaks(start, counter, length, step, modulus, rows)].copy()
+    return rows
+
+
+def longest_run(values: np.ndarray, time: np.ndarray, since: float, least: float) -> tuple[Run | None, float]:
+    """The longest run of equal samples, and when the last sample's run began.
+
+    values : [n], n >= 1;  time : float64 [n], s, ascending
+    since  : when the run that values[0] belongs to began
+    least  : s; None is returned if no run is longer.  Of runs equally long the first counts.
+    """
+    # Only whether two integers are equal counts, not their sign.
+    kind = f"i{values.itemsize}" if values.dtype.kind == "u" else values.dtype
+    began, duration, last = _frames.longest_run(np.ascontiguousarray(values).view(kind), time, since, least)
+    return (Run(began, duration) if duration > least else None), last
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    if len(parts) == 1:
+        return parts[0]
+    return np.concatenate(parts) if parts else np.empty(0, dtype=np.int64)
