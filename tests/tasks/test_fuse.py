@@ -20,7 +20,6 @@ RATE_HZ, SECONDS = 10.0, 400
 DEFINITIONS = ("level", "residual")
 ARW = (0.05, 0.05, 0.15)
 ANALYSIS = {
-    "engine": "reference",
     "volatility": {"window": 120, "step": 40, "definitions": DEFINITIONS},
     "fusion": {"moment_window_s": 60},
     "crosscheck": {"windows": 2},
@@ -119,7 +118,7 @@ def test_weights_reach_the_samples_of_their_block(analysed):
         np.testing.assert_allclose(fused["dcc_in_sample[level]"][inside], expected, atol=1e-12)
 
 
-FULL = {**ANALYSIS, "engine": "native", "volatility": {"rate_hz": "full"}}
+FULL = {**ANALYSIS, "volatility": {"rate_hz": "full"}}
 
 
 def write_weights(path, time, names, row_group):
@@ -167,7 +166,7 @@ def test_both_engines_fuse_alike(analysed):
 def test_same_bytes_for_any_threads_and_instruction_set(analysed, tmp_path):
     # As the workflow runs it: python -m vgyro.tasks.fuse.
     tables = [str(analysed / name / "weights.parquet") for name in DEFINITIONS]
-    task = task_of(analysed, {}, {}, analysis={**ANALYSIS, "engine": "native"})
+    task = task_of(analysed, {}, {})
     written = set()
     for extra in ({"VGYRO_THREADS": "1"}, {"VGYRO_THREADS": "3"}, {"VGYRO_ISA": "baseline"}):
         command = [sys.executable, "-m", "vgyro.tasks.fuse", "--input", "rates", str(analysed / "rates.parquet")]
