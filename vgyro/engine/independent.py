@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
+
+PIECE = 1 << 20
 
 
 def nnls_weights(H: np.ndarray) -> np.ndarray:
@@ -32,17 +36,28 @@ def textbook_allan_deviation(rate: np.ndarray, rate_hz: float, tau: float, segme
     IEEE Std 952 defines it by means of the rate, not by the angle; the means are running sums in extended precision.
     """
     length = round(tau * rate_hz)
-    stretches = [rate] if segment is None else np.split(rate, np.flatnonzero(np.diff(segment)) + 1)
+    borders = [] if segment is None else (np.flatnonzero(segment[1:] != segment[:-1]) + 1).tolist()
     total, pairs = 0.0, 0
-    for stretch in stretches:
-        if len(stretch) < 3 * length:
+    for start, stop in itertools.pairwise([0, *borders, len(rate)]):
+        if stop - start < 3 * length:
             continue
-        running = np.concatenate([[0.0], np.cumsum(stretch - stretch.mean(), dtype=np.longdouble)])
-        means = (running[length:] - running[:-length]) / length
-        difference = means[length:] - means[:-length]
-        total += float(np.sum(difference**2))
-        pairs += len(difference)
+        running = _running_sum(rate[start:stop])
+        count = stop - start - 2 * length + 1
+        for first in range(0, count, PIECE):
+            last = min(first + PIECE, count)
+            before, middle, after = (running[first + shift : last + shift] for shift in (0, length, 2 * length))
+            total += float(np.sum(((after - middle) / length - (middle - before) / length) ** 2))
+        pairs += count
     return float(np.sqrt(total / (2 * pairs))) if pairs else float("nan")
+
+
+def _running_sum(rate: np.ndarray) -> np.ndarray:
+    """0 and the running sums of rate [T] less its mean, [T + 1], in extended precision; made in pieces, to be lean."""
+    mean, running = rate.mean(), np.zeros(len(rate) + 1, dtype=np.longdouble)
+    for first in range(0, len(rate), PIECE):
+        piece = rate[first : first + PIECE] - mean
+        running[first + 1 : first + 1 + len(piece)] = running[first] + np.cumsum(piece, dtype=np.longdouble)
+    return running
 
 
 def printed_filter(rate: np.ndarray, rate_hz: float, R: np.ndarray, q: float, tau: float) -> np.ndarray:

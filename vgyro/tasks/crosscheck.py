@@ -1,4 +1,4 @@
-"""Crosscheck: a random sample of the results, computed again by an independent route."""
+"""Crosscheck: a random sample of the results, computed again by the other engine and by independent routes."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vgyro.config import CrossCheckOptions
+from vgyro.board import Board
+from vgyro.config import CrossCheckOptions, FusionOptions
 from vgyro.engine.independent import printed_filter, textbook_allan_deviation
+from vgyro.fusion import FilterParameters
 from vgyro.fusion.design import information, q_for_bandwidth
-from vgyro.storage.tables import read_columns, read_metadata, write_table
+from vgyro.storage.tables import read_columns, read_metadata, read_rows, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.crosscheck_rows import Row, columns_of, compare
 from vgyro.tasks.crosscheck_windows import window_rows
-from vgyro.tasks.fusion_inputs import OpenArray, open_array
-from vgyro.tasks.rates_file import read_array
+from vgyro.tasks.fusion_inputs import in_motion, read_noise
+from vgyro.tasks.rates_file import read_array, read_column
 
 FILTER_SAMPLES = 2000
 FILTER_TOLERANCE = 1e-9  # of the largest rate
@@ -24,63 +26,68 @@ ALLAN_TOLERANCE = 1e-7  # of the deviation
 
 
 def main(task: Task) -> None:
-    """inputs : rates, noise, fused, methods, allan, garch, dcc, weights;  outputs : crosscheck
+    """inputs : rates, noise, fused, methods, allan, series, garch, dcc, weights;  outputs : crosscheck
 
-    options : board, axis, recording, kind, analysis (volatility, fusion, crosscheck)
+    options : board, axis, recording, kind, analysis (engine, volatility, fusion, crosscheck)
     """
     options = CrossCheckOptions.model_validate(task.options["analysis"].get("crosscheck", {}))
+    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     rng = np.random.default_rng(options.seed)
-    opened = open_array(task)
     rows = [
-        *window_rows(task, opened.gyros, options.windows, rng),
-        *filter_rows(task, opened),
-        *allan_rows(task, opened, rng),
+        *window_rows(task, options.windows, rng),
+        *filter_rows(task, gyros),
+        *allan_rows(task, gyros, rng),
     ]
     failed = sum(not row.passed for row in rows)
     logging.info("%d comparisons, %d of them outside the tolerance", len(rows), failed)
     write_table(task.output("crosscheck"), columns_of(rows), "crosscheck", task.provenance())
 
 
-def filter_rows(task: Task, opened: OpenArray) -> Iterator[Row]:
+def filter_rows(task: Task, gyros: list[str]) -> Iterator[Row]:
     """The filters of Jiang et al. over the first samples, by filterpy: the sample that differs most."""
     columns = read_metadata(task.input("fused"))["units"]
-    first = opened.rates.stretches()[0]
-    part = slice(first.start, min(first.stop, FILTER_SAMPLES))
-    rate = opened.rates.rate[part]
-    for name, tau in (("jiang_markov", opened.parameters.tau_s), ("jiang_random_walk", np.inf)):
+    fusion = FusionOptions.model_validate(task.options["analysis"].get("fusion", {}))
+    for name, tau in (("jiang_markov", fusion.tau_s), ("jiang_random_walk", np.inf)):
         if name not in columns:
             continue
-        ours = read_columns(task.input("fused"), [name])[name][part]
-        R = opened.rates.noise.with_arw(opened.parameters.arw).R
-        q = opened.parameters.q or q_for_bandwidth(information(R), opened.parameters.bandwidth_hz, tau)
-        theirs = printed_filter(rate, opened.rates.rate_hz, R, q, tau)
+        rate = _first_samples(task, gyros)
+        ours = read_rows(task.input("fused"), [name], 0, len(rate))[name]
+        at_rest = read_columns(task.input("rates"), ["at_rest"])["at_rest"].astype(bool)
+        parameters = FilterParameters.of(fusion, in_motion(task.options["kind"], at_rest))
+        R = read_noise(task.input("noise"), gyros).with_arw(parameters.arw).R
+        q = parameters.q or q_for_bandwidth(information(R), parameters.bandwidth_hz, tau)
+        theirs = printed_filter(rate, float(read_metadata(task.input("rates"))["rate_hz"]), R, q, tau)
         tolerance = FILTER_TOLERANCE * float(np.abs(rate).max())
         check = f"filter, worst of the first {len(rate)} samples"
         yield compare(check, "filterpy, sample by sample", -1, name, ours, theirs, tolerance, "deg/s")
 
 
-def allan_rows(task: Task, opened: OpenArray, rng: np.random.Generator) -> Iterator[Row]:
+def _first_samples(task: Task, gyros: list[str]) -> np.ndarray:
+    """Rates [T, N] of the beginning of the first stretch, deg/s."""
+    found = read_rows(task.input("rates"), ["segment", *gyros], 0, FILTER_SAMPLES)
+    here = found["segment"] == found["segment"][0]
+    return np.column_stack([found[gyro][here] for gyro in gyros]).astype(float)
+
+
+def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterator[Row]:
     """Some points of the Allan curves of a few series, by the definition."""
     curves = read_columns(task.input("allan"), ["series", "tau", "deviation"])
     names = sorted(set(curves["series"]))
     if not names:
         return
-    file = read_array(task.input("rates"), opened.gyros, task.options["axis"])
+    file = read_array(task.input("rates"), [], task.options["axis"])
     rest, segment = file.at_rest, file.rest_segment()
     for name in rng.permutation(names)[:ALLAN_SERIES]:
-        rate = (
-            file.rate[:, opened.gyros.index(name)]
-            if name in opened.gyros
-            else read_columns(task.input("fused"), [name])[name]
-        )
+        rate = read_column(task.input("rates" if name in gyros else "fused"), str(name))
+        rate = rate if rest.all() else rate[rest]
         places = np.flatnonzero(curves["series"] == name)
         for place in np.sort(rng.permutation(places)[:ALLAN_TAUS]):
             tau, ours = float(curves["tau"][place]), float(curves["deviation"][place])
-            theirs = textbook_allan_deviation(rate[rest], file.rate_hz, tau, segment)
-            check = f"Allan deviation, τ = {tau:.4g} s"
+            theirs = textbook_allan_deviation(rate, file.rate_hz, tau, segment)
             yield compare(
-                check, "definition: adjacent means", -1, str(name), ours, theirs, ALLAN_TOLERANCE * abs(ours), "deg/s"
-            )
+                f"Allan deviation, τ = {tau:.4g} s", "definition: adjacent means", -1, str(name), ours, theirs,
+                ALLAN_TOLERANCE * abs(ours), "deg/s",
+            )  # fmt: skip
 
 
 if __name__ == "__main__":

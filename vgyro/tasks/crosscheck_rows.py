@@ -38,11 +38,24 @@ def compare(
     first, second = np.ravel(ours).astype(float), np.ravel(theirs).astype(float)
     distance = np.abs(first - second)
     worst = int(np.argmax(np.where(np.isnan(distance), np.inf, distance)))
-    difference = float(first[worst] - second[worst])
-    passed = bool(abs(difference) <= tolerance)
-    return Row(
-        check, against, window, series, float(first[worst]), float(second[worst]), difference, tolerance, unit, passed
-    )
+    return _row(check, against, window, series, (first[worst], second[worst]), tolerance, unit, two_sided=True)
+
+
+def compare_maximum(
+    check: str, against: str, window: int, series: str, ours: float, theirs: float, tolerance: float
+) -> Row:
+    """Compare two maxima of one likelihood: ours may be greater, but not smaller by more than the tolerance."""
+    return _row(check, against, window, series, (ours, theirs), tolerance, "1", two_sided=False)
+
+
+def _row(
+    check: str, against: str, window: int, series: str, pair: tuple[float, float], tolerance: float, unit: str,
+    *, two_sided: bool,
+) -> Row:  # fmt: skip
+    ours, theirs = float(pair[0]), float(pair[1])
+    difference = ours - theirs
+    passed = bool(abs(difference) <= tolerance if two_sided else difference >= -tolerance)
+    return Row(check, against, window, series, ours, theirs, difference, tolerance, unit, passed)
 
 
 def columns_of(rows: list[Row]) -> pa.Table:
