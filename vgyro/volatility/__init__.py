@@ -4,7 +4,7 @@ from vgyro.engine.models import DccFit, GarchFit
 from vgyro.volatility.arch_lm import ArchLm, arch_lm, kurtosis
 from vgyro.volatility.dcc import Test, constant_correlation_test, dcc_correlation, fit_ccc, fit_dcc
 from vgyro.volatility.garch import fit_garch, garch_from_parameters, garch_variance
-from vgyro.volatility.rolling import ModelWindow, RollingWeights, rolling_weights
+from vgyro.volatility.rolling import WindowModels, WindowWeights, weights_of_windows
 from vgyro.volatility.series import Series, block_means, detrended, residuals, window_residuals
 from vgyro.volatility.stretches import Window, longest_stretch, stretches, windows
 
@@ -12,11 +12,11 @@ __all__ = [
     "ArchLm",
     "DccFit",
     "GarchFit",
-    "ModelWindow",
-    "RollingWeights",
     "Series",
     "Test",
     "Window",
+    "WindowModels",
+    "WindowWeights",
     "arch_lm",
     "block_means",
     "constant_correlation_test",
@@ -30,8 +30,8 @@ __all__ = [
     "kurtosis",
     "longest_stretch",
     "residuals",
-    "rolling_weights",
     "stretches",
+    "weights_of_windows",
     "window_residuals",
     "windows",
 ]

@@ -8,9 +8,9 @@ from vgyro.engine.models import ConditionalWeights
 from vgyro.engine.native import _weights, pool
 from vgyro.errors import EngineError
 
-PIECE = 1024
+PIECE = 16384
 """Matrices that a thread takes at once; like WINDOWS, a multiple of four."""
-WINDOWS = 16
+WINDOWS = 64
 
 
 def min_variance_weights(H: np.ndarray) -> np.ndarray:
