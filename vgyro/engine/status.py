@@ -27,6 +27,8 @@ ALPHA_NEAR_ZERO = 1e-3
 """α (and a) below this has no usable standard error: β (b) is all but unidentified."""
 BETA_NEAR_ZERO = 1e-6
 PERSISTENCE_NEAR_ONE = 1 - 2 * (1 - PERSISTENCE_MAX)
+OMEGA_MIN = 1e-8
+"""Smallest ω that a fit may return, in units of mean(e²)."""
 GAIN = 1e-6
 """Log-likelihood a sample by which a model must beat the simpler one (constant variance, constant correlation)."""
 OUTLIER_SHARE = 0.2

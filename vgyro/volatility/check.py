@@ -9,6 +9,8 @@ import numpy as np
 PERSISTENCE_MAX = 1.0 - 1e-6
 GRID_ALPHA = (0.0, 0.005, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32, 0.45, 0.65, 0.9)
 GRID_PERSISTENCE = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985, 0.993, 0.998)
+TREND_BETA = (0.3, 0.6, 0.9, 0.98, 0.996)
+TREND_LEVEL = (0.6, 0.85, 1.15, 1.6)
 BEST = 3
 BOUNDS = ((1e-8, 5.0), (0.0, PERSISTENCE_MAX), (0.0, 1.0))
 SLOPE_STEP = 1e-6
@@ -19,8 +21,9 @@ def greatest_log_likelihood(e: np.ndarray) -> float:
 
     e       : array [T], deg/s, zero mean, not constant
     returns : max of -½Σ(log 2π + log h + e²/h), h_t = ω + α e²_{t-1} + β h_{t-1}, h_1 = ω + (α + β)·mean(e²)
-    The likelihood is evaluated on a dense grid of (α, α + β), with ω such that the mean variance is mean(e²); from the
-    best points scipy's bounded quasi-Newton search goes on in (ω, α + β, α/(α + β)).
+    The likelihood is evaluated on a dense grid of (α, α + β), with ω such that the mean variance is mean(e²), and on
+    trends of the variance, where α = 0; from the best points of each scipy's bounded quasi-Newton search goes on in
+    (ω, α + β, α/(α + β)).
     """
     from scipy.optimize import minimize
 
@@ -29,11 +32,15 @@ def greatest_log_likelihood(e: np.ndarray) -> float:
     points = np.array([(total, alpha / total if total else 0.0) for total in GRID_PERSISTENCE for alpha in GRID_ALPHA
                        if alpha <= total])  # fmt: skip
     starts = np.column_stack([1.0 - points[:, 0], points])
-    values = _log_likelihood(unit, starts)
-    best = float(values.max())
-    for index in np.argsort(-values, kind="stable")[:BEST]:
+    trends = np.array([(level * (1.0 - beta), beta, 0.0) for beta in TREND_BETA for level in TREND_LEVEL])
+    best, chosen = -math.inf, []
+    for part in (starts, trends):
+        values = _log_likelihood(unit, part)
+        best = max(best, float(values.max()))
+        chosen += list(part[np.argsort(-values, kind="stable")[:BEST]])
+    for start in chosen:
         found = minimize(
-            _cost_and_slope, starts[index], args=(unit,), jac=True, bounds=BOUNDS, method="L-BFGS-B",
+            _cost_and_slope, start, args=(unit,), jac=True, bounds=BOUNDS, method="L-BFGS-B",
             options={"ftol": 1e-13, "gtol": 1e-6, "maxiter": 500},
         )  # fmt: skip
         best = max(best, -float(found.fun))

@@ -12,7 +12,7 @@ from vgyro.errors import TooShort
 garch_variance = recursions.garch_variance
 
 
-def fit_garch(r: np.ndarray, engine: str = "reference") -> GarchFit:
+def fit_garch(r: np.ndarray, engine: str = "native") -> GarchFit:
     """Fit h_t = ω + α e²_{t-1} + β h_{t-1} to each gyro by Gaussian quasi maximum likelihood.
 
     r       : [T, N] deg/s, one series a column; the model's mean is zero
@@ -20,13 +20,15 @@ def fit_garch(r: np.ndarray, engine: str = "reference") -> GarchFit:
     returns : GarchFit; ω in (deg/s)²
     raises  : TooShort if there is no sample at all; EngineError if the engine is unknown
 
-    Conventions. ω > 0, α >= 0, β >= 0, α + β < 1. The recursion starts at ε_0² = h_0 = mean(e²), so that
-    h_1 = ω + (α + β)·mean(e²) (Fiorentini, Calzolari & Panattoni 1996). Each series is divided by its own r.m.s.
-    first. Several starts, the best likelihood wins, and no start depends on another series or window. Where α is 0, β
-    is not identified: the model is then the constant variance ω = mean(e²), α = β = 0, status `boundary`; a fit with
-    α > 0 is kept only if its likelihood is better. Standard errors are Bollerslev & Wooldridge's robust ones, NaN at
-    the boundary and where α < 0.001.
-    A series that does not vary, is too short or holds NaN gets a status and NaN, never an exception.
+    Conventions. Each series is divided by its own r.m.s. first. ω > 0 (at least 1e-8 of mean(e²)), α >= 0, β >= 0,
+    α + β < 1. The recursion starts at ε_0² = h_0 = mean(e²), so that h_1 = ω + (α + β)·mean(e²) (Fiorentini, Calzolari
+    & Panattoni 1996). The result is the greatest likelihood over this set, α = 0 included: h_t is then a trend of the
+    variance, from mean(e²) to ω/(1 - β). Several starts; no start depends on another series or window. Where the best
+    point gains less than 1e-6 a sample over the constant variance, that is the answer: ω = mean(e²), α = β = 0.
+    Status: `boundary: …` where the optimum lies there (α counts as 0 below 0.001), `outlier-dominated` where one sample
+    holds more than a fifth of Σe². Standard errors are Bollerslev & Wooldridge's (1992) robust ones,
+    H⁻¹(ΣSS')H⁻¹; NaN unless the status is `converged`.
+    A series that does not vary, is too short (< 20 samples) or holds NaN gets a status and NaN, never an exception.
     Bollerslev (1986); Liu et al. (2015), eq. 1.
     """
     r = _two_dimensional(r)

@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
-import itertools
 import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from vgyro.engine.models import BOUNDARY, CONVERGED, FAILED, NO_VARIANCE, PERSISTENCE_MAX, TOO_SHORT, GarchFit
+from vgyro.engine import status as rules
+from vgyro.engine.models import (
+    CONVERGED,
+    FAILED,
+    GARCH_STATUSES,
+    NO_VARIANCE,
+    PERSISTENCE_MAX,
+    TOO_SHORT,
+    GarchFit,
+    GarchWindows,
+)
 from vgyro.engine.recursions import garch_log_likelihood, garch_variance
 
-MIN_SAMPLES = 20
-ALPHA_ZERO = 1e-4
-"""α below this is 0: what is left of the likelihood there is a trend of the variance, not its memory."""
-BETA_ZERO = 1e-6
-ALPHA_NEAR_ZERO = 1e-3
-"""α below this has no usable standard error: β is all but unidentified."""
-FLAT = 1e-12
-"""A series that varies by less than this share of its size has no variance."""
-# Grid of starts: the best point of each half is handed to the optimiser, so that no start depends on another window.
-GRID_ALPHA = (0.005, 0.02, 0.05, 0.1, 0.2, 0.35)
-GRID_SLOW = (0.8, 0.9, 0.95, 0.98, 0.995)
-GRID_FAST = (0.05, 0.2, 0.4, 0.6)
-OPTIONS = {"ftol": 1e-8, "maxiter": 300}
+# Starts: the best point of each part is handed to the optimiser, so that no start depends on another window.
+ALPHAS = (0.005, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.95)
+SLOW = (0.8, 0.9, 0.95, 0.98, 0.995)
+FAST = (0.01, 0.05, 0.2, 0.4, 0.6, 0.97)
+# Trends of the variance, α = 0: from h_0 = 1 to a level, within so many samples.
+LEVELS = (0.5, 0.75, 0.9, 1.1, 1.3, 2.0)
+SHORT = (0.5, 2.0, 10.0)
+LONG = (50.0, 250.0, 2000.0)
+# Outliers, which raise the mean square: (ω, α) in units of 1 - β.
+RAISED = ((0.2, 1.0), (0.6, 1.0), (0.3, 0.5), (0.8, 0.1))
+RAISED_BETA = (0.0, 0.4, 0.7, 0.85, 0.93)
+OPTIONS = {"ftol": 1e-9, "maxiter": 300}
 
 
 @dataclass(frozen=True)
@@ -61,31 +69,46 @@ def fit_garch(r: np.ndarray) -> GarchFit:
     )
 
 
+def fit_garch_windows(r: np.ndarray) -> GarchWindows:
+    """fit_garch of each window of r [K, T, N], deg/s."""
+    windows, _, n = r.shape
+    found = GarchWindows(
+        *(np.full((windows, n), np.nan) for _ in range(3)),
+        stderr=np.full((windows, n, 3), np.nan),
+        log_likelihood=np.full((windows, n), np.nan),
+        status=np.zeros((windows, n), dtype=np.uint8),
+    )
+    for k, window in enumerate(r):
+        fit = fit_garch(window)
+        for name in ("omega", "alpha", "beta", "stderr", "log_likelihood"):
+            getattr(found, name)[k] = getattr(fit, name)
+        found.status[k] = [rules.garch_code(status) for status in fit.status]
+    return found
+
+
 def _fit_column(column: np.ndarray, scale: float) -> _Series:
     nothing = np.full(3, np.nan)
+    if len(column) < rules.MIN_SAMPLES:
+        return _Series(nothing, nothing, TOO_SHORT)
     if not np.all(np.isfinite(column)):
         return _Series(nothing, nothing, FAILED)
-    if len(column) < MIN_SAMPLES:
-        return _Series(nothing, nothing, TOO_SHORT)
-    if np.ptp(column) <= FLAT * np.max(np.abs(column)):
+    if np.ptp(column) <= rules.FLAT * np.max(np.abs(column)):
         return _Series(nothing, nothing, NO_VARIANCE)
     e = column / np.sqrt(scale)
     model = _model(e, 1, 1)
-    # With α = 0 nothing is left but a constant variance: β = 0, ω = mean(e²).
     constant = np.array([1.0, 0.0, 0.0])
-    best, best_value, fit = constant, _value(e, constant), None
+    best, best_value, fit = constant, _value(e, constant) + rules.GAIN * len(e), None
     results = [result for result in (_fit_from(model, start) for start in _starts(e)) if _ended_well(result)]
     for result in results:
         parameters = _inside(np.asarray(result.params, dtype=float))
         value = _value(e, parameters)
-        if parameters[1] > ALPHA_ZERO and value > best_value:
+        if value >= best_value:
             best, best_value, fit = parameters, value, result
-    if fit is None:
-        return _Series(constant, nothing, BOUNDARY if results else FAILED)
-    if best[1] < ALPHA_NEAR_ZERO or best[2] < BETA_ZERO or best[1] + best[2] >= PERSISTENCE_MAX:
-        return _Series(best, nothing, BOUNDARY)
-    stderr = _stderr(fit)
-    return _Series(best, stderr, CONVERGED if np.all(np.isfinite(stderr)) else BOUNDARY)
+    if not results:
+        return _Series(constant, nothing, FAILED)
+    outlier = rules.outlier_dominated(e[:, None])
+    status = GARCH_STATUSES[rules.garch_status_codes(best[[1]], best[[2]], outlier)[0]]
+    return _Series(best, _stderr(fit) if status == CONVERGED else nothing, status)
 
 
 def _model(e: np.ndarray, arch_lags: int, garch_lags: int) -> Any:
@@ -107,10 +130,10 @@ def _ended_well(result: Any) -> bool:
 
 
 def _inside(parameters: np.ndarray) -> np.ndarray:
-    """Clip what the optimiser returned to α, β >= 0, α + β < 1; a β of rounding is 0."""
-    omega = max(parameters[0], 1e-8)
-    alpha = min(max(parameters[1], 0.0), PERSISTENCE_MAX)
-    beta = min(parameters[2], PERSISTENCE_MAX - alpha) if parameters[2] >= BETA_ZERO else 0.0
+    """Clip what the optimiser returned to the constraints; an α or β of rounding is 0."""
+    omega = max(parameters[0], rules.OMEGA_MIN)
+    alpha = min(parameters[1], PERSISTENCE_MAX) if parameters[1] >= rules.BETA_NEAR_ZERO else 0.0
+    beta = min(parameters[2], PERSISTENCE_MAX - alpha) if parameters[2] >= rules.BETA_NEAR_ZERO else 0.0
     return np.array([omega, alpha, beta])
 
 
@@ -121,22 +144,28 @@ def _value(e: np.ndarray, parameters: np.ndarray) -> float:
 
 
 def _starts(e: np.ndarray) -> list[np.ndarray]:
+    parts = [
+        [(1 - total, alpha, total - alpha) for alpha in ALPHAS for total in part if total > alpha]
+        for part in (SLOW, FAST)
+    ]
+    parts += [
+        [(level * (1 - np.exp(-1 / time)), 0.0, np.exp(-1 / time)) for level in LEVELS for time in part]
+        for part in (SHORT, LONG)
+    ]
+    parts += [[(omega * (1 - beta), alpha * (1 - beta), beta) for omega, alpha in RAISED for beta in RAISED_BETA]]
     starts = []
-    for half in (GRID_SLOW, GRID_FAST):
-        points = [(alpha, total - alpha) for alpha, total in itertools.product(GRID_ALPHA, half) if total > alpha]
-        alpha, beta = np.array(points).T
-        omega = 1 - alpha - beta
+    for points in map(np.array, parts):
         series = np.repeat(e[:, None], len(points), axis=1)
-        best = int(np.argmax(garch_log_likelihood(series, garch_variance(series, omega, alpha, beta))))
-        starts.append(np.array([omega[best], alpha[best], beta[best]]))
+        best = int(np.argmax(garch_log_likelihood(series, garch_variance(series, *points.T))))
+        starts.append(points[best])
     return starts
 
 
 def _stderr(result: Any) -> np.ndarray:
-    """Bollerslev & Wooldridge's robust standard errors, as arch computes them."""
+    """Bollerslev & Wooldridge's robust standard errors, as arch computes them, but with 1/T where it has 1/(T - 1)."""
     try:
         with np.errstate(invalid="ignore"):
-            return np.asarray(result.std_err, dtype=float)
+            return np.asarray(result.std_err, dtype=float) * np.sqrt(1 - 1 / result.nobs)
     except np.linalg.LinAlgError:
         return np.full(3, np.nan)
 
@@ -165,7 +194,7 @@ def fit_garch_pq(r: np.ndarray, p: int = 1, q: int = 1) -> GarchPq:
     omega, alpha, beta = np.full(n, np.nan), np.full((n, q), np.nan), np.full((n, p), np.nan)
     variance, status = np.full((samples, n), np.nan), np.full(n, FAILED, dtype=object)
     for i, column in enumerate(r.T):
-        if np.ptp(column) <= FLAT * np.max(np.abs(column)):
+        if np.ptp(column) <= rules.FLAT * np.max(np.abs(column)):
             status[i] = NO_VARIANCE
             continue
         scale = float(np.mean(np.square(column)))

@@ -1,0 +1,135 @@
+#include "garch.h"
+
+#include "vg.h"
+#include "garch_newton.h"
+
+/* The grid that finds where to begin: rows of β, and columns of α = share·(1 - β), ω = (1 - share + excess)(1 - β).
+   The second set of columns is for series with large outliers, whose mean square is far from their usual variance. */
+#define ROWS 8
+#define COLUMNS 4
+#define STARTS 6
+#define WORTH 0.2       /* share of the best gain so far that a start must have, unless there are */
+#define LARGE_OUTLIER 20 /* in units of the mean square */
+static const double row_beta[ROWS] = {0.0, 0.4, 0.7, 0.85, 0.93, 0.97, 0.99, 0.997};
+typedef struct {
+    double share[COLUMNS], excess[COLUMNS];
+} columns_t;
+static const columns_t usual = {{0.12, 0.35, 0.65, 0.95}, {0, 0, 0, 0}};
+static const columns_t robust = {{1, 1, 0.5, 0.1}, {0.2, 0.6, -0.2, -0.1}};
+
+/* What a row of the grid says of one series: the cost of its columns, and the sums that one step of scoring from the
+   constant variance needs (h = 1 + αg + δa, a_t = 1 + βa_{t-1}, y = e² - 1). */
+typedef struct {
+    double cost[COLUMNS], yg, ya, gg, ga, aa, last;
+} row_t;
+
+/* One series on its way: the points that its searches begin at, in order of their cost, and the best optimum so far. */
+typedef struct {
+    double x[STARTS][3], cost[STARTS];
+    double best[3], best_cost;
+    int count, next, outlier;
+} series_t;
+
+static void add_start(series_t *series, const double *x, double cost) {
+    int place = series->count < STARTS ? series->count++ : STARTS;
+    for (; place > 0 && series->cost[place - 1] > cost; place--)
+        if (place < STARTS) {
+            memcpy(series->x[place], series->x[place - 1], sizeof series->x[place]);
+            series->cost[place] = series->cost[place - 1];
+        }
+    if (place < STARTS) {
+        memcpy(series->x[place], x, sizeof series->x[place]);
+        series->cost[place] = cost;
+    }
+}
+
+/* One step of scoring from the constant variance at a given β, α >= 0: the point, and the cost that it promises. */
+static double scored(const row_t *row, double beta, ptrdiff_t samples, double *x) {
+    double determinant = row->gg * row->aa - row->ga * row->ga;
+    double a = (row->yg * row->aa - row->ya * row->ga) / determinant;
+    double d = (row->ya * row->gg - row->yg * row->ga) / determinant;
+    if (!(a > 0)) a = 0, d = row->ya / row->aa;
+    double gain = 0.25 * (a * row->yg + d * row->ya) / (double)samples;
+    a = fmin(a, 0.9 * (1 - beta));
+    d = fmin(fmax(d, fmax(-0.8 / row->last, -0.9 * (1 - beta - a))), 3 / row->last);
+    x[0] = 1 - beta - a + d;
+    x[1] = a;
+    x[2] = beta;
+    return 0.5 - gain;
+}
+
+/* The best column of each row: its point and its cost. */
+static void best_columns(const row_t *rows, const columns_t *columns, double (*x)[3], double *cost) {
+    for (int i = 0; i < ROWS; i++) {
+        int best = 0;
+        for (int j = 1; j < COLUMNS; j++)
+            if (rows[i].cost[j] < rows[i].cost[best]) best = j;
+        cost[i] = rows[i].cost[best];
+        x[i][0] = (1 - columns->share[best] + columns->excess[best]) * (1 - row_beta[i]);
+        x[i][1] = columns->share[best] * (1 - row_beta[i]);
+        x[i][2] = row_beta[i];
+    }
+}
+
+/* Searches begin at the local optima along β. */
+static void add_optima(series_t *series, double (*x)[3], const double *cost, double below) {
+    for (int i = 0; i < ROWS; i++)
+        if (cost[i] < below && !(i > 0 && cost[i - 1] <= cost[i]) && !(i + 1 < ROWS && cost[i + 1] < cost[i]))
+            add_start(series, x[i], cost[i]);
+}
+
+/* Where the searches of a series begin; `shifted` are its rows with the robust columns. */
+static void choose(const row_t *rows, const row_t *shifted, ptrdiff_t samples, series_t *series) {
+    double x[ROWS][3], cost[ROWS];
+    best_columns(rows, &usual, x, cost);
+    add_optima(series, x, cost, 0.5);
+    for (int i = 0; i < ROWS; i++) cost[i] = scored(&rows[i], row_beta[i], samples, x[i]);
+    add_optima(series, x, cost, INFINITY);
+    if (series->outlier) {
+        best_columns(shifted, &robust, x, cost);
+        add_optima(series, x, cost, INFINITY);
+    }
+}
+
+/* Begins the next search of a series; 0 where there is none left that could win. */
+static int next_search(series_t *series, newton_t *newton) {
+    while (series->next < series->count) {
+        int i = series->next++;
+        if (!series->outlier && 0.5 - series->cost[i] < WORTH * (0.5 - series->best_cost)) continue;
+        newton_begin(newton, series->x[i]);
+        return 1;
+    }
+    return 0;
+}
+
+/* Bollerslev & Wooldridge's robust standard errors of (w, a, b): H⁻¹ (ΣSS') H⁻¹. NaN where H is not positive definite. */
+static void standard_errors(const point_t *at, ptrdiff_t samples, double *out) {
+    /* rows: w, a, b in the coordinates (level, a, b) */
+    const double rows[3][3] = {{1, -1, -1}, {0, 1, 0}, {0, 0, 1}};
+    for (int i = 0; i < 3; i++) {
+        double minus[3] = {-rows[i][0], -rows[i][1], -rows[i][2]}, solved[3], spread[3];
+        out[i] = NAN;
+        if (!descend(at->curvature, at->metric, 1, minus, 0, solved)) continue;
+        times(at->outer, solved, spread);
+        out[i] = sqrt(dot(solved, spread) / (double)samples);
+    }
+}
+
+#define VG_KERNELS "garch_kernels.h"
+#include "each_isa.h"
+
+int vg_garch_fit(const vg_garch_data_t *data, const vg_garch_search_t *search, ptrdiff_t first, ptrdiff_t stop,
+                 vg_garch_fit_t *fit) {
+    return VG_CHOOSE(garch_fit)(data, search, first, stop, fit);
+}
+
+void vg_garch_variance(const vg_garch_data_t *data, const double *start, const double *omega, const double *alpha,
+                       const double *beta, double *variance) {
+    const ptrdiff_t n = data->series;
+    for (ptrdiff_t i = 0; i < n; i++) variance[i] = start[i];
+    for (ptrdiff_t t = 1; t < data->samples; t++)
+        for (ptrdiff_t i = 0; i < n; i++) {
+            double r = data->r[(t - 1) * data->sample_stride + i * data->series_stride];
+            variance[t * n + i] = omega[i] + alpha[i] * (r * r) + beta[i] * variance[(t - 1) * n + i];
+        }
+}

@@ -1,0 +1,290 @@
+/* The hot code of GARCH(1,1), four series in lockstep; compiled once for each instruction set. */
+
+/* Takes the exponent off x > 0, adds it to *power, and returns the mantissa. */
+VG_INLINE v4 VG(mantissa)(v4 x, m4 *power) {
+    m4 bits = (m4)x;
+    *power += (bits >> 52) - 1023;
+    return (v4)((bits & INT64_C(0x000fffffffffffff)) | INT64_C(0x3ff0000000000000));
+}
+
+VG_INLINE double VG(log_of)(double mantissa, int64_t power) { return log(mantissa) + (double)power * M_LN2; }
+
+#define BLOCK 16 /* samples between two looks at the exponent */
+
+/* Loads four series in lane order, in units of their mean squares; sets outcome, mean_square and largest_share. */
+static void VG(load)(const vg_garch_data_t *data, ptrdiff_t first, ptrdiff_t stop, double flat, v4 *square,
+                     vg_garch_fit_t *fit) {
+    const double *from[VG_LANES];
+    for (int lane = 0; lane < VG_LANES; lane++) {
+        ptrdiff_t number = first + lane < stop ? first + lane : stop - 1;
+        from[lane] = data->r + number / data->series * data->window_stride + number % data->series * data->series_stride;
+    }
+    v4 sum = v4_set(0), low = v4_set(INFINITY), high = v4_set(-INFINITY), most = v4_set(0);
+    m4 finite = sum == sum;
+    for (ptrdiff_t t = 0, at = 0; t < data->samples; t++, at += data->sample_stride) {
+        v4 r = {from[0][at], from[1][at], from[2][at], from[3][at]};
+        v4 e = r * r;
+        finite &= e - e == 0;
+        low = v4_min(low, r);
+        high = v4_max(high, r);
+        sum += e;
+        most = v4_max(most, e);
+        square[t] = e;
+    }
+    v4 mean = sum / v4_set((double)data->samples);
+    for (int lane = 0; lane < VG_LANES; lane++) {
+        double width = high[lane] - low[lane], size = fmax(fabs(high[lane]), fabs(low[lane]));
+        if (!finite[lane])
+            fit[lane].outcome = VG_GARCH_FAILED;
+        else if (width <= flat * size)
+            fit[lane].outcome = VG_GARCH_FLAT;
+        else
+            fit[lane].outcome = mean[lane] > 1e-290 && mean[lane] < 1e290 ? VG_GARCH_FITTED : VG_GARCH_FAILED;
+        fit[lane].mean_square = mean[lane];
+        fit[lane].largest_share = most[lane] / sum[lane];
+    }
+    m4 good = {fit[0].outcome == VG_GARCH_FITTED ? -1 : 0, fit[1].outcome == VG_GARCH_FITTED ? -1 : 0,
+               fit[2].outcome == VG_GARCH_FITTED ? -1 : 0, fit[3].outcome == VG_GARCH_FITTED ? -1 : 0};
+    v4 scale = v4_set(1) / v4_select(good, mean, v4_set(1));
+    for (ptrdiff_t t = 0; t < data->samples; t++) square[t] = v4_select(good, square[t] * scale, v4_set(1));
+}
+
+/* A row of the grid, of four series: h = 1 + αg + δd, g_t = y_{t-1} + βg_{t-1}, d_t = 1 + βd_{t-1}, y = e² - 1. One
+   division for four samples. */
+VG_INLINE void VG(row)(const v4 *square, ptrdiff_t samples, double beta, const columns_t *columns, int shifted,
+                       row_t *out) {
+    const v4 one = v4_set(1), b = v4_set(beta), zero = v4_set(0);
+    v4 g = zero, d = one, a[COLUMNS], s[COLUMNS], product[COLUMNS], sum[COLUMNS];
+    v4 yg = zero, ya = zero, gg = zero, ga = zero, aa = zero;
+    m4 power[COLUMNS];
+    for (int i = 0; i < COLUMNS; i++) {
+        a[i] = v4_set(columns->share[i] * (1 - beta));
+        s[i] = v4_set(columns->excess[i] * (1 - beta));
+        product[i] = one;
+        sum[i] = zero;
+        power[i] = (m4){0, 0, 0, 0};
+    }
+    for (ptrdiff_t begin = 0; begin < samples; begin += BLOCK) {
+        ptrdiff_t end = begin + BLOCK < samples ? begin + BLOCK : samples, t = begin;
+        v4 g0 = g, d0 = d;
+        for (; t + 3 < end; t += 4) {
+            v4 e0 = square[t], e1 = square[t + 1], e2 = square[t + 2], e3 = square[t + 3];
+            v4 g1 = (e0 - one) + b * g0, g2 = (e1 - one) + b * g1, g3 = (e2 - one) + b * g2;
+            v4 d1 = one + b * d0, d2 = one + b * d1, d3 = one + b * d2;
+            for (int i = 0; i < COLUMNS; i++) {
+                v4 h0 = one + a[i] * g0, h1 = one + a[i] * g1, h2 = one + a[i] * g2, h3 = one + a[i] * g3;
+                if (shifted) h0 += s[i] * d0, h1 += s[i] * d1, h2 += s[i] * d2, h3 += s[i] * d3;
+                v4 p = h0 * h1, q = h2 * h3, all = p * q;
+                sum[i] += ((e0 * h1 + e1 * h0) * q + (e2 * h3 + e3 * h2) * p) / all;
+                product[i] *= all;
+            }
+            g0 = (e3 - one) + b * g3;
+            d0 = one + b * d3;
+        }
+        for (; t < end; t++) {
+            for (int i = 0; i < COLUMNS; i++) {
+                v4 h = one + a[i] * g0;
+                if (shifted) h += s[i] * d0;
+                sum[i] += square[t] / h;
+                product[i] *= h;
+            }
+            g0 = (square[t] - one) + b * g0;
+            d0 = one + b * d0;
+        }
+        for (int i = 0; i < COLUMNS; i++) product[i] = VG(mantissa)(product[i], &power[i]);
+        for (t = begin; t < end; t++) { /* only the usual row is asked for these */
+            if (shifted) {
+                g = (square[t] - one) + b * g;
+                d = one + b * d;
+                continue;
+            }
+            v4 y = square[t] - one;
+            yg += y * g;
+            ya += y * d;
+            gg += g * g;
+            ga += g * d;
+            aa += d * d;
+            g = y + b * g;
+            d = one + b * d;
+        }
+    }
+    for (int lane = 0; lane < VG_LANES; lane++) {
+        row_t *row = &out[lane * ROWS];
+        for (int i = 0; i < COLUMNS; i++) {
+            double log_h = VG(log_of)(product[i][lane], power[i][lane]);
+            row->cost[i] = 0.5 * (log_h + sum[i][lane]) / (double)samples;
+        }
+        row->yg = yg[lane], row->ya = ya[lane], row->gg = gg[lane], row->ga = ga[lane], row->aa = aa[lane];
+        row->last = d[lane];
+    }
+}
+
+/* Looks at all points of the grid, and says where the searches of four series begin. */
+static void VG(begin)(const v4 *square, ptrdiff_t samples, series_t *series) {
+    row_t rows[VG_LANES * ROWS], shifted[VG_LANES * ROWS];
+    v4 most = v4_set(0);
+    for (ptrdiff_t t = 0; t < samples; t++) most = v4_max(most, square[t]);
+    m4 outlier = most > LARGE_OUTLIER;
+    for (int i = 0; i < ROWS; i++) VG(row)(square, samples, row_beta[i], &usual, 0, rows + i);
+    for (int i = 0; i < ROWS && m4_any(outlier); i++) VG(row)(square, samples, row_beta[i], &robust, 1, shifted + i);
+    for (int lane = 0; lane < VG_LANES; lane++) {
+        series[lane] = (series_t){.best = {1, 0, 0}, .best_cost = 0.5, .outlier = outlier[lane] != 0};
+        choose(rows + lane * ROWS, shifted + lane * ROWS, samples, &series[lane]);
+    }
+}
+
+/* Cost and derivatives at one point of each lane, by the recursions of dh/dx and d²h/dx² (coordinates of newton.h). */
+VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x, int with_outer, point_t *out) {
+    const v4 one = v4_set(1), zero = v4_set(0), w = x[0], a = x[1], b = x[2];
+    v4 h = w + a + b, product = one, sum = zero;
+    v4 dl = one, da = zero, db = zero, dlb = zero, dab = zero, dbb = zero;
+    v4 g0 = zero, g1 = zero, g2 = zero, m0 = zero, m1 = zero, m2 = zero;
+    v4 c00 = zero, c01 = zero, c02 = zero, c11 = zero, c12 = zero, c22 = zero;
+    v4 s00 = zero, s01 = zero, s02 = zero, s11 = zero, s12 = zero, s22 = zero;
+    m4 power = {0, 0, 0, 0};
+    for (ptrdiff_t begin = 0; begin < samples; begin += BLOCK) {
+        ptrdiff_t end = begin + BLOCK < samples ? begin + BLOCK : samples;
+        for (ptrdiff_t t = begin; t < end; t++) {
+            v4 e = square[t], u = one / h, z = e * u;
+            product *= h;
+            sum += z;
+            v4 p = u * dl, q = u * da, r = u * db, d = one - z, c = z + z - one;
+            v4 dp = d * p, dq = d * q, dr = d * r;
+            g0 += dp;
+            g1 += dq;
+            g2 += dr;
+            if (with_outer) {
+                s00 += dp * dp;
+                s01 += dp * dq;
+                s02 += dp * dr;
+                s11 += dq * dq;
+                s12 += dq * dr;
+                s22 += dr * dr;
+            }
+            v4 pp = p * p, qq = q * q, rr = r * r, cp = c * p, cq = c * q, du = d * u;
+            m0 += pp;
+            m1 += qq;
+            m2 += rr;
+            c00 += c * pp;
+            c01 += cp * q;
+            c02 += cp * r + du * dlb;
+            c11 += c * qq;
+            c12 += cq * r + du * dab;
+            c22 += c * rr + du * dbb;
+            dbb = (db + db) + b * dbb;
+            dab = da + b * dab;
+            dlb = dl + b * dlb;
+            db = (h - one) + b * db;
+            da = (e - one) + b * da;
+            dl = one + b * dl;
+            h = (w + a * e) + b * h;
+        }
+        product = VG(mantissa)(product, &power);
+    }
+    const double half = 0.5 / (double)samples;
+    for (int lane = 0; lane < VG_LANES; lane++) {
+        const v4 *sums[] = {&g0, &g1, &g2, &c00, &c01, &c02, &c11, &c12, &c22, &m0, &m1, &m2};
+        double *to = out[lane].slope; /* slope, curvature, metric follow each other */
+        out[lane].cost = half * (VG(log_of)(product[lane], power[lane]) + sum[lane]);
+        for (int i = 0; i < 12; i++) to[i] = half * (*sums[i])[lane];
+        const v4 *squares[] = {&s00, &s01, &s02, &s11, &s12, &s22};
+        for (int i = 0; i < 6; i++) out[lane].outer[i] = 0.5 * half * (*squares[i])[lane];
+    }
+}
+
+static __attribute__((noinline)) void VG(look)(const v4 *square, ptrdiff_t samples, const v4 *x, point_t *out) {
+    VG(derivatives)(square, samples, x, 0, out);
+}
+
+static __attribute__((noinline)) void VG(look_with_outer)(const v4 *square, ptrdiff_t samples, const v4 *x, point_t *out) {
+    VG(derivatives)(square, samples, x, 1, out);
+}
+
+/* Puts a series into a lane of the work. */
+static void VG(fill)(const v4 *square, int from, ptrdiff_t samples, v4 *work, int to) {
+    const double *source = (const double *)square + from;
+    double *target = (double *)work + to;
+    for (ptrdiff_t t = 0; t < samples; t++) target[VG_LANES * t] = source[VG_LANES * t];
+}
+
+/* All searches of the series: a lane that is done with one takes the next. */
+static void VG(search)(const v4 *square, ptrdiff_t samples, const vg_garch_search_t *search, series_t *series,
+                       ptrdiff_t count, v4 *work) {
+    const double idle[3] = {1, 0, 0};
+    ptrdiff_t in_lane[VG_LANES], next = 0;
+    newton_t newton[VG_LANES];
+    point_t seen[VG_LANES];
+    for (ptrdiff_t t = 0; t < samples; t++) work[t] = v4_set(1);
+    for (int lane = 0; lane < VG_LANES; lane++) in_lane[lane] = -1;
+    for (;;) {
+        v4 x[3];
+        int busy = 0;
+        for (int lane = 0; lane < VG_LANES; lane++) {
+            while (in_lane[lane] < 0 && next < count) {
+                if (next_search(&series[next], &newton[lane])) {
+                    in_lane[lane] = next;
+                    VG(fill)(square + next / VG_LANES * samples, (int)(next % VG_LANES), samples, work, lane);
+                }
+                next++;
+            }
+            busy |= in_lane[lane] >= 0;
+            for (int i = 0; i < 3; i++) x[i][lane] = in_lane[lane] < 0 ? idle[i] : newton[lane].trial[i];
+        }
+        if (!busy) return;
+        VG(look)(work, samples, x, seen);
+        for (int lane = 0; lane < VG_LANES; lane++) {
+            if (in_lane[lane] < 0) continue;
+            series_t *of = &series[in_lane[lane]];
+            newton_t *n = &newton[lane];
+            int state = newton_next(n, &seen[lane], search->omega_min, search->persistence_max);
+            if (state == SEARCHING && !is_near(n, of->best, of->best_cost)) continue;
+            if (n->at.cost < of->best_cost) {
+                of->best_cost = n->at.cost;
+                memcpy(of->best, n->x, sizeof n->x);
+            }
+            if (!next_search(of, n)) in_lane[lane] = -1;
+        }
+    }
+}
+
+static void VG(fit_piece)(const vg_garch_data_t *data, const vg_garch_search_t *search, ptrdiff_t first, ptrdiff_t stop,
+                          v4 *square, v4 *work, series_t *series, vg_garch_fit_t *fit) {
+    const ptrdiff_t samples = data->samples, count = stop - first;
+    for (ptrdiff_t i = 0; i < count; i += VG_LANES) {
+        v4 *four = square + i / VG_LANES * samples;
+        VG(load)(data, first + i, stop, search->flat, four, fit + i);
+        VG(begin)(four, samples, series + i);
+    }
+    VG(search)(square, samples, search, series, count, work);
+    for (ptrdiff_t i = 0; i < count; i += VG_LANES) {
+        v4 x[3];
+        point_t seen[VG_LANES];
+        for (int lane = 0; lane < VG_LANES; lane++)
+            for (int j = 0; j < 3; j++) x[j][lane] = series[i + lane].best[j];
+        VG(look_with_outer)(square + i / VG_LANES * samples, samples, x, seen);
+        for (int lane = 0; lane < VG_LANES; lane++) {
+            memcpy(fit[i + lane].parameters, series[i + lane].best, sizeof fit->parameters);
+            fit[i + lane].cost = seen[lane].cost;
+            standard_errors(&seen[lane], samples, fit[i + lane].stderr_);
+        }
+    }
+}
+
+static int VG(garch_fit)(const vg_garch_data_t *data, const vg_garch_search_t *search, ptrdiff_t first, ptrdiff_t stop,
+                         vg_garch_fit_t *fit) {
+    const size_t samples = (size_t)data->samples, padded = ((size_t)(stop - first) + VG_LANES - 1) / VG_LANES * VG_LANES;
+    v4 *square = aligned_alloc(sizeof(v4), padded * samples * sizeof(double));
+    v4 *work = aligned_alloc(sizeof(v4), samples * sizeof(v4));
+    series_t *series = malloc(padded * sizeof *series);
+    vg_garch_fit_t *fits = malloc(padded * sizeof *fits);
+    const int ready = square && work && series && fits;
+    if (ready) {
+        VG(fit_piece)(data, search, first, stop, square, work, series, fits);
+        memcpy(fit, fits, (size_t)(stop - first) * sizeof *fit);
+    }
+    free(square);
+    free(work);
+    free(series);
+    free(fits);
+    return ready ? 0 : -1;
+}
