@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
+from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from vgyro.metrics.allan import AllanCurve
 TERMS = ("N", "B", "K")
 FLICKER = 2 * math.log(2) / math.pi
 PASSES = 12
+SETTLED = 1e-9  # relative change of the model from pass to pass
 FEWEST_POINTS = 6
 STEPS_OF_BISECTION = 10
 LARGEST_MISFIT = 5.0
@@ -138,26 +140,28 @@ def _solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray, terms:
 
     Exact: every subset of the at most three bounded columns is tried, and the best admissible one taken.
     """
-    number = columns.shape[1]
-    free = tuple(range(terms, number))
     scaled = columns * np.sqrt(weights)[:, None]
-    norm = np.linalg.norm(scaled, axis=0)
+    norm = np.sqrt((scaled * scaled).sum(axis=0))
     scaled /= norm
-    gram = scaled.T @ scaled
-    right = (targets * np.sqrt(weights)) @ scaled
-    best, gain = np.zeros((len(targets), number)), np.full(len(targets), -np.inf)
-    for size in range(terms + 1):
-        for chosen in combinations(range(terms), size):
-            subset = list(chosen + free)
-            values = np.linalg.solve(gram[np.ix_(subset, subset)], right[:, subset].T).T if subset else right[:, :0]
-            # The sum of squares falls by this much when the subset is fitted.
-            explained = (values * right[:, subset]).sum(axis=1)
-            better = (values[:, :size] >= 0).all(axis=1) & (explained > gain)
-            gain = np.where(better, explained, gain)
-            row = np.zeros((len(targets), number))
-            row[:, subset] = values
-            best = np.where(better[:, None], row, best)
-    return best / norm
+    chosen = _subsets(columns.shape[1], terms)
+    # A column that is not in a subset has the equation x = 0.
+    gram = (scaled.T @ scaled) * (chosen[:, :, None] & chosen[:, None, :])
+    gram[:, range(len(norm)), range(len(norm))] += ~chosen
+    right = ((targets * np.sqrt(weights)) @ scaled).T
+    values = np.linalg.solve(gram, right * chosen[:, :, None])
+    # The sum of squares falls by this much when the subset is fitted.
+    explained = (values * right).sum(axis=1)
+    explained[(values[:, :terms] < 0).any(axis=1)] = -np.inf
+    best = np.argmax(explained, axis=0)
+    return values[best, :, np.arange(len(targets))] / norm
+
+
+@cache
+def _subsets(number: int, terms: int) -> np.ndarray:
+    """All choices among the first `terms` of `number` columns, the others always chosen, [2^terms, number]."""
+    bits = np.array(list(product((False, True), repeat=terms))).reshape(2**terms, terms)
+    bits = bits[np.argsort(bits.sum(axis=1), kind="stable")]
+    return np.hstack([bits, np.ones((len(bits), number - terms), dtype=bool)])
 
 
 def _fit(
@@ -175,7 +179,7 @@ def _fit(
         part = _solve(columns[:, open_terms], (variance - known)[None], edf / (2 * scale**2), bounded)[0]
         values[open_terms] = part
         following = np.maximum(columns @ values, LOWEST_SHARE * variance)
-        if np.allclose(following, scale, rtol=1e-9, atol=0):
+        if (np.abs(following - scale) <= SETTLED * scale).all():
             break
         scale = following
     return values

@@ -25,7 +25,7 @@ from vgyro.metrics import (
     stretches,
     thinned,
 )
-from vgyro.storage.tables import read_columns, write_table
+from vgyro.storage.tables import Provenance, read_columns, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.rates_file import ArrayFile, chosen_rows, read_array, read_column
 
@@ -96,10 +96,11 @@ def main(task: Task) -> None:
     if reference is not None:
         moving = dynamic_figures(Columns(series), reference, frame.rate_hz, frame.segment, len(gyros), options)
         readings = [{**still, **row} for still, row in zip(readings, moving, strict=True)]
-    write_tables(task, series, curves, spectra, readings)
+    made = task.provenance()
+    write_tables(task, made, series, curves, spectra, readings)
     correlation = noise_correlation(read_array(rates, gyros, axis), rest, reference, options)
     write_table(
-        task.output("correlation"), correlation_columns(gyros, correlation), "correlation", task.provenance(),
+        task.output("correlation"), correlation_columns(gyros, correlation), "correlation", made,
         {"of": "samples at rest" if resting else "rate - reference"},
     )  # fmt: skip
 
@@ -137,6 +138,7 @@ def noise_correlation(
 
 def write_tables(
     task: Task,
+    made: Provenance,
     series: list[Series],
     curves: dict[str, AllanCurve],
     spectra: dict[str, Spectrum],
@@ -148,13 +150,13 @@ def write_tables(
     }
     columns = {"series": _repeated({name: len(curve.tau) for name, curve in curves.items()})}
     columns |= {name: np.concatenate([np.empty(0), *parts]) for name, parts in allan.items()}
-    write_table(task.output("allan"), columns, "allan", task.provenance())
+    write_table(task.output("allan"), columns, "allan", made)
     thin = {name: thinned(spectrum, SPECTRUM_POINTS) for name, spectrum in spectra.items()}
     columns = {"series": _repeated({name: len(spectrum.frequency) for name, spectrum in thin.items()})}
     columns["frequency"] = np.concatenate([np.empty(0), *(spectrum.frequency for spectrum in thin.values())])
     columns["density"] = np.concatenate([np.empty(0), *(spectrum.density for spectrum in thin.values())])
-    write_table(task.output("spectrum"), columns, "spectrum", task.provenance())
-    write_table(task.output("metrics"), metric_columns(task, series, readings), "metrics", task.provenance())
+    write_table(task.output("spectrum"), columns, "spectrum", made)
+    write_table(task.output("metrics"), metric_columns(task, series, readings), "metrics", made)
 
 
 def metric_columns(task: Task, series: list[Series], readings: list[dict[str, Reading]]) -> dict[str, np.ndarray]:
