@@ -76,8 +76,8 @@ def exactly(H, support):
 
 
 def test_kkt_conditions_of_hard_problems():
-    # Expected: Hw = λ where w > 0, Hw >= λ elsewhere, λ = w'Hw. Row i in units of √(h_ii · min h): one rounding of w moves
-    # it by so much times 1e-16. Evaluated in extended precision.
+    # Expected: Hw = λ where w > 0, Hw >= λ elsewhere, λ = w'Hw, evaluated in extended precision. Row i in units of
+    # √(h_ii · min h): rounding of w alone moves it by about 1e-16 of that.
     H = hard_problems(5000)
     w = weights.min_variance_weights(H)
     assert np.linalg.cond(H / np.sqrt(np.einsum("kii,kjj->kij", H, H))).max() > 5e9
@@ -230,9 +230,8 @@ def test_equal_weights_where_the_covariance_cannot_be_used():
 
 def test_no_window_and_no_sample():
     assert weights.conditional_weights(*windows(2, 30, 20, 3), 7, 7).weights.shape == (2, 0, 3)
-    assert weights.conditional_weights(*(x[:0] if np.ndim(x) else x for x in windows(2, 30, 20, 3)), 3, 7).good.shape == (
-        0, 4,
-    )  # fmt: skip
+    nothing = [x[:0] if np.ndim(x) else x for x in windows(2, 30, 20, 3)]
+    assert weights.conditional_weights(*nothing, 3, 7).good.shape == (0, 4)
 
 
 def test_what_the_engine_refuses():
