@@ -31,7 +31,7 @@ def contests(quick: bool) -> list[Contest]:
     few = 1 if quick else 2
     pymgarch = Side(f"pymgarch {version('pymgarch')}", lambda: [fit_pymgarch(w) for w in r[:few]], few)
     margins = GYROS * WINDOW * (GRID * PASS + STEPS * NEWTON)
-    divisions = GYROS * WINDOW * (GRID + STEPS) + WINDOW * EVALUATIONS * 2 * GYROS
+    divisions = GYROS * WINDOW * (GRID + STEPS) / 2 + WINDOW * EVALUATIONS * 2 * GYROS
     limit = arithmetic(margins + WINDOW * EVALUATIONS * EVALUATION, divisions)
     note = "ours includes the two-step standard errors and the test of constant correlation"
     return [

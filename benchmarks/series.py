@@ -32,7 +32,7 @@ def dcc_windows(count: int, seed: int, samples: int = WINDOW, gyros: int = GYROS
 
 
 def covariance_path(count: int, seed: int, gyros: int = GYROS) -> np.ndarray:
-    """A path of covariance matrices [count, gyros, gyros], each near the one before; bounds are active in most, and change.
+    """A path of covariance matrices [count, gyros, gyros], each near the one before; bounds are active in most.
 
     Correlation by a common part of unequal size, deviations that wander: the set of gyros with a weight changes.
     """
