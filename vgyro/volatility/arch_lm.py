@@ -63,6 +63,7 @@ def _statistic(column: np.ndarray, lags: int) -> float:
 def kurtosis(residual: np.ndarray) -> np.ndarray:
     """Kurtosis mean(x⁴)/mean(x²)² of each column about its mean, [N]; 3 for a Gaussian, NaN for a constant."""
     away = residual - residual.mean(axis=0)
-    square = np.mean(np.square(away), axis=0)
+    square = np.square(away)
+    size = square.mean(axis=0)
     flat = np.ptp(residual, axis=0) <= FLAT * np.max(np.abs(residual), axis=0)
-    return np.where(flat, np.nan, np.mean(away**4, axis=0) / np.where(flat, 1.0, square) ** 2)
+    return np.where(flat, np.nan, np.mean(np.square(square), axis=0) / np.where(flat, 1.0, size) ** 2)

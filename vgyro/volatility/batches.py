@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from vgyro.config import Definition
 
@@ -23,26 +24,25 @@ def window_batch(
     ahead   : samples after each window; beyond the end of `values` the last sample is repeated
     span    : samples of the first-pass rate estimate of `residual`
     stretch_starts : [K] first sample of each window's stretch in `values`, for `difference`; None: starts
-    returns : [K, length + ahead, N] deg/s; `difference` is NaN in the first sample of a stretch
+    returns : [K, length + ahead, N] deg/s, of `level` perhaps a view of `values`; `difference` is NaN in the first
+              sample of a stretch
     """
     total = length + ahead
     block = _cut(values, starts, total)
     if definition == "level":
         return block
     if definition == "demeaned":
-        block -= block[:, :length].mean(axis=1, keepdims=True)
-        return block
+        return block - block[:, :length].mean(axis=1, keepdims=True)
     if definition == "difference":
+        r = np.empty(block.shape)
+        np.subtract(block[:, 1:], block[:, :-1], out=r[:, 1:])
         known = starts > (starts if stretch_starts is None else stretch_starts)
-        first = np.where(known[:, None], values[np.maximum(starts - 1, 0)], np.nan)
-        block[:, 1:] = block[:, 1:] - block[:, :-1]
-        block[:, 0] -= first
-        return block
+        r[:, 0] = block[:, 0] - np.where(known[:, None], values[np.maximum(starts - 1, 0)], np.nan)
+        return r
     low, high = span_about(total, length, span // 2)
     median = _cut(np.median(values, axis=1), starts, total)
     sums = np.concatenate([np.zeros((len(starts), 1)), np.cumsum(median, axis=1)], axis=1)
-    block -= ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
-    return block
+    return block - ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
 
 
 def fitted_batch(
@@ -62,11 +62,10 @@ def fitted_batch(
     r = window_batch(values, starts, length, 0, definition, span, stretch_starts)
     if definition == "difference" and len(r) and np.isnan(r[0, 0]).all():
         r = r[:, 1:]
-    changes = np.cumsum(np.diff(values, axis=0, prepend=values[:1]) != 0, axis=0)
-    stuck = changes[starts + length - 1] == changes[starts]
-    if stuck.any():
-        r = np.where(stuck[:, None, :], 0.0, r)
-    return r
+    stuck = values[starts] == values[starts + length - 1]
+    for window, gyro in zip(*np.nonzero(stuck), strict=True):
+        stuck[window, gyro] = np.ptp(values[starts[window] : starts[window] + length, gyro]) == 0
+    return np.where(stuck[:, None, :], 0.0, r) if stuck.any() else r
 
 
 def span_about(total: int, inside: int, half: int) -> tuple[np.ndarray, np.ndarray]:
@@ -80,6 +79,11 @@ def span_about(total: int, inside: int, half: int) -> tuple[np.ndarray, np.ndarr
 
 
 def _cut(values: np.ndarray, starts: np.ndarray, total: int) -> np.ndarray:
-    """Rows start to start + total - 1 for each start, [K, total, ...], a copy."""
-    rows = np.minimum(np.asarray(starts)[:, None] + np.arange(total), len(values) - 1)
-    return values[rows].astype(float, copy=False)
+    """Rows start to start + total - 1 for each start, [K, total, ...]: a view where the starts are evenly spaced."""
+    values = np.asarray(values, dtype=float)
+    step = int(starts[1] - starts[0]) if len(starts) > 1 else 1
+    if step > 0 and starts[-1] + total <= len(values) and np.all(np.diff(starts) == step):
+        strides = (step * values.strides[0], *values.strides)
+        return as_strided(values[starts[0] :], (len(starts), total, *values.shape[1:]), strides)
+    rows = np.minimum(starts[:, None] + np.arange(total), len(values) - 1)
+    return values[rows]
