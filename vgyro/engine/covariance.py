@@ -8,6 +8,8 @@ from vgyro.engine.recursions import dcc_correlation, garch_variance
 
 SINGULAR = 1e-12
 """Smallest eigenvalue of the correlation below which the minimum of w'Hw is not one point any more."""
+ASYMMETRY = 1e-9
+"""Largest difference of a correlation from its transpose that is still rounding."""
 
 
 def conditional_covariance(
@@ -47,5 +49,5 @@ def usable(H: np.ndarray) -> np.ndarray:
     positive = finite & (variance > 0).all(axis=-1)
     scale = np.sqrt(np.where(positive[..., None], variance, 1.0))
     correlation = np.where(positive[..., None, None], safe, 0.0) / (scale[..., :, None] * scale[..., None, :])
-    symmetric = (np.abs(correlation - np.swapaxes(correlation, -1, -2)) <= 1e-9).all(axis=(-1, -2))
+    symmetric = (np.abs(correlation - np.swapaxes(correlation, -1, -2)) <= ASYMMETRY).all(axis=(-1, -2))
     return positive & symmetric & (np.linalg.eigvalsh(correlation)[..., 0] > SINGULAR)

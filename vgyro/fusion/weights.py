@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vgyro import engine as engines
-from vgyro.engine.covariance import usable
+from vgyro.engine.covariance import usable as usable
 from vgyro.errors import DataError, EngineError
 
 
@@ -26,15 +26,14 @@ def min_variance_weights(H: np.ndarray, engine: str = "native") -> np.ndarray:
     matrices = H.reshape(-1, size, size)
     if len(matrices) == 0:
         return np.empty(H.shape[:-1])
-    _refuse_unusable(matrices, H.shape[:-2])
-    matrices = (matrices + matrices.transpose(0, 2, 1)) / 2
-    return engines.get(engine).weights.min_variance_weights(matrices).reshape(H.shape[:-1])
+    weights = engines.get(engine).weights.min_variance_weights(matrices)
+    bad = np.flatnonzero(np.isnan(weights[:, 0]))
+    if len(bad):
+        _refuse(matrices, bad, H.shape[:-2])
+    return weights.reshape(H.shape[:-1])
 
 
-def _refuse_unusable(matrices: np.ndarray, leading: tuple[int, ...]) -> None:
-    bad = np.flatnonzero(~usable(matrices))
-    if len(bad) == 0:
-        return
+def _refuse(matrices: np.ndarray, bad: np.ndarray, leading: tuple[int, ...]) -> None:
     index = tuple(int(i) for i in np.unravel_index(bad[0], leading)) if leading else ()
     kind = "is not symmetric and positive definite" if np.isfinite(matrices[bad[0]]).all() else "is not finite"
     raise EngineError(

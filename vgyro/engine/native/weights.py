@@ -16,8 +16,8 @@ WINDOWS = 64
 def min_variance_weights(H: np.ndarray) -> np.ndarray:
     """min w'Hw, Σw = 1, 0 ≤ w ≤ 1, for a stack of matrices.
 
-    H       : array [M, N, N], symmetric, N ≤ 32; vgyro.fusion.min_variance_weights refuses what cannot be used
-    returns : w [M, N]; NaN where the correlation has no eigenvalue above 1e-12 (vgyro.engine.covariance.usable)
+    H       : array [M, N, N], N ≤ 32
+    returns : w [M, N]; NaN where H cannot be used (vgyro.engine.covariance.usable)
     raises  : EngineError for more gyros
 
     With Hx ≥ 1, x ≥ 0, x'(Hx - 1) = 0 the weights are x/Σx. The support is found by block principal pivoting from the

@@ -20,21 +20,25 @@ KKT = 1e-11
 def min_variance_weights(H: np.ndarray) -> np.ndarray:
     """min w'Hw, Σw = 1, 0 ≤ w ≤ 1, for a stack of matrices.
 
-    H       : array [M, N, N], symmetric, positive definite (vgyro.fusion.min_variance_weights checks that)
-    returns : w [M, N]
+    H       : array [M, N, N]
+    returns : w [M, N]; NaN where H cannot be used (vgyro.engine.covariance.usable)
     Where H⁻¹1 has no negative element it is the answer already, by its KKT conditions; the rest goes to cvxpy
     (Clarabel). Then the equality system is solved on the support, so that the weights are exact to rounding, and the
     KKT conditions are checked; a support that fails them is mended by single exchanges.
     Liu et al. (2015), eq. 15-16; they name an active-set method.
     """
+    good = usable(H)
+    weights = np.full(H.shape[:2], np.nan)
+    symmetric = (H[good] + H[good].transpose(0, 2, 1)) / 2
     # The optimum is at most the smallest variance: with that as the unit every figure that matters is of order one,
     # however noisy the worst gyro is.
-    scaled = H / np.diagonal(H, axis1=1, axis2=2).min(axis=1)[:, None, None]
-    weights = _on_support(scaled, np.ones(H.shape[:2], dtype=bool))
-    open_ones = np.flatnonzero((weights < 0).any(axis=1))
+    scaled = symmetric / np.diagonal(symmetric, axis1=1, axis2=2).min(axis=1)[:, None, None]
+    found = _on_support(scaled, np.ones(scaled.shape[:2], dtype=bool))
+    open_ones = np.flatnonzero((found < 0).any(axis=1))
     for start in range(0, len(open_ones), BATCH):
         chosen = open_ones[start : start + BATCH]
-        weights[chosen] = _polish(scaled[chosen], _solve(scaled[chosen]))
+        found[chosen] = _polish(scaled[chosen], _solve(scaled[chosen]))
+    weights[good] = found
     return weights
 
 
@@ -55,14 +59,15 @@ def conditional_weights(
     Arguments and result as in vgyro.engine.native.weights. H_t comes from SciPy's filters, the weights from cvxpy.
     """
     count, _, n = r.shape
-    weights = np.full((count, end - begin, n), 1.0 / n)
+    weights = np.empty((count, end - begin, n))
     deviation, sigma = np.empty_like(weights), np.empty(weights.shape[:2])
     good = np.empty(weights.shape[:2], dtype=bool)
     for k in range(count):
         path = conditional_covariance(r[k], inside, omega[k], alpha[k], beta[k], float(a[k]), float(b[k]), target[k])
         H = path[begin:end]
-        good[k] = usable(H)
-        weights[k, good[k]] = min_variance_weights(H[good[k]])
+        weights[k] = min_variance_weights(H)
+        good[k] = ~np.isnan(weights[k]).any(axis=1)
+        weights[k, ~good[k]] = 1.0 / n
         deviation[k] = np.sqrt(np.diagonal(H, axis1=1, axis2=2))
         sigma[k] = np.sqrt(np.einsum("ti,tij,tj->t", weights[k], H, weights[k]))
     return ConditionalWeights(weights, deviation, sigma, good)

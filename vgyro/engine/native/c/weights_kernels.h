@@ -1,6 +1,7 @@
 /* Four problems in lockstep. Matrices are [n, n] of vectors, vectors [n]; n is a constant where speed matters. */
 
-#define SINGULAR 1e-12 /* as in vgyro.engine.covariance */
+#define SINGULAR 1e-12 /* these two as in vgyro.engine.covariance */
+#define ASYMMETRY 1e-9
 #define NOISE (8 * 0x1p-53)
 /* With pivots at least this large one step of refinement with plain residuals leaves no more than rounding. */
 #define WELL_CONDITIONED 0x1p-6
@@ -13,6 +14,7 @@
 #define GUESS_EXCHANGES 4
 #define EXCHANGES_EACH 64
 
+typedef double VG(unaligned) __attribute__((vector_size(32), aligned(8), may_alias));
 typedef uint64_t VG(bits) __attribute__((vector_size(32)));
 
 VG_INLINE v4 VG(absolute)(v4 x) { return (v4)((m4)x & INT64_MAX); }
@@ -20,6 +22,22 @@ VG_INLINE v4 VG(absolute)(v4 x) { return (v4)((m4)x & INT64_MAX); }
 /* The same place of four arrays. */
 VG_INLINE v4 VG(gather)(const double *const *from, size_t place) {
     return (v4){from[0][place], from[1][place], from[2][place], from[3][place]};
+}
+
+/* Four places from `place` on of four arrays. */
+VG_INLINE void VG(gather_four)(const double *const *from, size_t place, v4 *to) {
+    const v4 rows[VG_LANES] = {
+        *(const VG(unaligned) *)(from[0] + place), *(const VG(unaligned) *)(from[1] + place),
+        *(const VG(unaligned) *)(from[2] + place), *(const VG(unaligned) *)(from[3] + place)
+    };
+    const v4 even = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6);
+    const v4 odd = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7);
+    const v4 even_after = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6);
+    const v4 odd_after = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+    to[0] = __builtin_shufflevector(even, even_after, 0, 1, 4, 5);
+    to[1] = __builtin_shufflevector(odd, odd_after, 0, 1, 4, 5);
+    to[2] = __builtin_shufflevector(even, even_after, 2, 3, 6, 7);
+    to[3] = __builtin_shufflevector(odd, odd_after, 2, 3, 6, 7);
 }
 
 /* LDL' of A on the support; off it the matrix reads as the identity. Returns the smallest pivot, NaN or
@@ -222,6 +240,25 @@ VG_INLINE m4 VG(weigh)(size_t n, const v4 *H, m4 *support, v4 *w) {
     return good;
 }
 
+/* Four matrices, the symmetric part in the lower triangle; the first place is NaN where one is not symmetric. */
+VG_INLINE void VG(take_matrices)(size_t n, const double *const *from, v4 *H) {
+    size_t place = 0;
+#pragma GCC unroll 16
+    for (; place + VG_LANES <= n * n; place += VG_LANES) VG(gather_four)(from, place, H + place);
+    for (; place < n * n; place++) H[place] = VG(gather)(from, place);
+    m4 different = {0}, asymmetric = {0};
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < i; j++) different |= H[i * n + j] != H[j * n + i];
+    if (!m4_any(different)) return;
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < i; j++) {
+            const v4 difference = H[i * n + j] - H[j * n + i];
+            asymmetric |= difference * difference > ASYMMETRY * ASYMMETRY * (H[i * n + i] * H[j * n + j]);
+            H[i * n + j] = (H[i * n + j] + H[j * n + i]) * 0.5;
+        }
+    H[0] = v4_select(asymmetric, v4_set(NAN), H[0]);
+}
+
 /* Each lane takes a run of matrices, which may follow from one another. */
 VG_INLINE void VG(min_variance_all)(size_t n, const double *H, size_t count, double *w) {
     v4 matrices[WEIGHTS_MAX * WEIGHTS_MAX], weights[WEIGHTS_MAX];
@@ -235,8 +272,7 @@ VG_INLINE void VG(min_variance_all)(size_t n, const double *H, size_t count, dou
             index[lane] = lane * run + step;
             from[lane] = H + (index[lane] < count ? index[lane] : count - 1) * n * n;
         }
-        for (size_t i = 0; i < n; i++)
-            for (size_t j = 0; j <= i; j++) matrices[i * n + j] = VG(gather)(from, i * n + j);
+        VG(take_matrices)(n, from, matrices);
         const m4 good = VG(weigh)(n, matrices, support, weights);
         for (size_t lane = 0; lane < VG_LANES; lane++)
             for (size_t i = 0; i < n && index[lane] < count; i++)
@@ -271,10 +307,10 @@ VG_INLINE v4 VG(root)(v4 x) {
 /* e of sample t; `leading` loses the lanes where all of them are finite. */
 VG_INLINE void VG(take_sample)(size_t n, const double *const *r, size_t t, v4 *e, m4 *leading) {
     m4 finite = ~(m4){0};
-    for (size_t i = 0; i < n; i++) {
-        e[i] = VG(gather)(r, t * n + i);
-        finite &= VG(absolute)(e[i]) < INFINITY;
-    }
+    size_t gyro = 0;
+    for (; gyro + VG_LANES <= n; gyro += VG_LANES) VG(gather_four)(r, t * n + gyro, e + gyro);
+    for (; gyro < n; gyro++) e[gyro] = VG(gather)(r, t * n + gyro);
+    for (size_t i = 0; i < n; i++) finite &= VG(absolute)(e[i]) < INFINITY;
     *leading &= ~finite;
 }
 
