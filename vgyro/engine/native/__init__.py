@@ -15,13 +15,22 @@ from __future__ import annotations
 
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vgyro.errors import EngineError
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
     from vgyro.engine.native import allan, dcc, frames, garch, kalman, weights  # noqa: F401
+
+    # Compiled: they have no Python source to read types from.
+    _allan: Any
+    _cpu: Any
+    _dcc: Any
+    _frames: Any
+    _garch: Any
+    _kalman: Any
+    _weights: Any
 
 MODULES = ("garch", "dcc", "weights", "allan", "kalman", "frames")
 
