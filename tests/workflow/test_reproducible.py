@@ -38,12 +38,16 @@ def test_second_run_one_core_and_edits(lab) -> None:
     assert not planned & {"decode", "calibrate", "convert", "volatility"}
     source.write_text(source.read_text(encoding="utf-8").removesuffix("\n# edited\n"), encoding="utf-8")
 
-    shutil.rmtree(lab.folder / "results")
-    shutil.rmtree(lab.folder / "reports")
-    shutil.rmtree(lab.folder / ".snakemake")
+    # From nothing, on one core, and with a job for every rolling window: the same bytes, and no parts left behind.
+    for folder in ("results", "reports", ".snakemake"):
+        shutil.rmtree(lab.folder / folder)
+    text = config.read_text(encoding="utf-8")
+    config.write_text(text.replace("chunk_windows: 20000", "chunk_windows: 1"), encoding="utf-8")
     again = lab.run("--cores", "1")
     assert again.returncode == 0, again.stdout
+    assert "volatility_chunk" in again.stdout
     assert lab.products() == products
+    assert "Nothing to be done" in lab.run("--cores", "2").stdout
 
 
 def test_progress_is_shown_and_units_are_inside(lab) -> None:
