@@ -215,6 +215,18 @@ def test_the_path_does_not_depend_on_the_batch_or_on_where_it_begins():
         np.testing.assert_array_equal(getattr(some, name), getattr(whole, name)[[30, 3, 8], 10:])
 
 
+def test_windows_may_overlap_in_memory():
+    given = windows(4, 50, 40, 3)
+    series = np.random.default_rng(1).standard_normal((100, 3))
+    view = np.lib.stride_tricks.sliding_window_view(series, 50, axis=0)[::10][:4].transpose(0, 2, 1)
+    assert view.strides[1:] == (24, 8)
+    for r in (view, np.asfortranarray(view), view.astype(np.float32)):
+        given[0] = r
+        found = weights.conditional_weights(*given, 30, 50)
+        given[0] = np.array(r, dtype=float)
+        np.testing.assert_array_equal(found.weights, weights.conditional_weights(*given, 30, 50).weights)
+
+
 def test_equal_weights_where_the_covariance_cannot_be_used():
     given = windows(6, 30, 20, 3)
     given[0][1, 25, 2] = np.nan  # all that comes after

@@ -1,4 +1,4 @@
-"""Binding of c/weights.h: arrays in, arrays out, no numerics. All arrays are C-contiguous."""
+"""Binding of c/weights.h: arrays in, arrays out, no numerics. All arrays are C-contiguous; windows may overlap."""
 
 from libc.stdint cimport uint8_t
 
@@ -8,6 +8,7 @@ cdef extern from "weights.h":
     ctypedef struct weights_windows:
         size_t n, length, inside, begin, end
         const double *r
+        ptrdiff_t apart
         const double *omega
         const double *alpha
         const double *beta
@@ -32,7 +33,7 @@ def min_variance_weights(const double[:, :, ::1] H, double[:, ::1] w, size_t sta
         vg_min_variance_weights(n, &H[start, 0, 0], stop - start, &w[start, 0])
 
 
-def conditional_weights(const double[:, :, ::1] r, size_t inside, const double[:, ::1] omega,
+def conditional_weights(const double[:, :, :] r, size_t inside, const double[:, ::1] omega,
                         const double[:, ::1] alpha, const double[:, ::1] beta, const double[::1] a,
                         const double[::1] b, const double[:, :, ::1] target, size_t begin, size_t end,
                         double[:, :, ::1] weights, double[:, :, ::1] deviation, double[:, ::1] sigma,
@@ -40,6 +41,7 @@ def conditional_weights(const double[:, :, ::1] r, size_t inside, const double[:
     """Weights of the samples begin..end-1 of the windows start..stop-1."""
     cdef weights_windows all
     all.n, all.length, all.inside, all.begin, all.end = r.shape[2], r.shape[1], inside, begin, end
+    all.apart = r.strides[0] // <Py_ssize_t>sizeof(double)
     all.r, all.omega, all.alpha, all.beta = &r[0, 0, 0], &omega[0, 0], &alpha[0, 0], &beta[0, 0]
     all.a, all.b, all.target = &a[0], &b[0], &target[0, 0, 0]
     all.weights, all.deviation, all.sigma = &weights[0, 0, 0], &deviation[0, 0, 0], &sigma[0, 0]

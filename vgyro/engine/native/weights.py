@@ -57,11 +57,14 @@ def conditional_weights(
     raises             : EngineError for more than 32 gyros
     Liu et al. (2015), eq. 1-6 and 15-16.
     """
-    r, omega, alpha, beta, a, b, target = (
-        np.ascontiguousarray(array, dtype=float) for array in (r, omega, alpha, beta, a, b, target)
+    omega, alpha, beta, a, b, target = (
+        np.ascontiguousarray(array, dtype=float) for array in (omega, alpha, beta, a, b, target)
     )
     count, length, n = r.shape
     _check_size(n)
+    # Windows that overlap in memory need no copy, as long as each is contiguous.
+    if r.dtype != float or r.strides[1:] != (8 * n, 8):
+        r = np.ascontiguousarray(r, dtype=float)
     shape = (count, end - begin, n)
     if not 0 <= begin <= end <= length or not 0 <= inside <= length:
         raise EngineError(f"samples {begin} to {end} (window: {inside}) of a series of {length}")

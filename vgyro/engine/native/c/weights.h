@@ -10,7 +10,8 @@
 /* Windows of `length` samples, the first `inside` of which the models were fitted to; results for samples begin..end-1. */
 typedef struct {
     size_t n, length, inside, begin, end;
-    const double *r;                           /* [K, length, n] */
+    const double *r;                           /* [K, length, n], windows `apart` numbers apart: they may overlap */
+    ptrdiff_t apart;
     const double *omega, *alpha, *beta;        /* [K, n] */
     const double *a, *b, *target;              /* [K], [K], [K, n, n] */
     double *weights, *deviation, *sigma;       /* [K, E, n], [K, E, n], [K, E], E = end - begin */

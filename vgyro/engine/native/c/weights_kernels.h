@@ -406,7 +406,7 @@ VG_INLINE void VG(conditional_all)(size_t n, const weights_windows *all, size_t 
         size_t window[VG_LANES];
         for (size_t lane = 0; lane < VG_LANES; lane++) {
             window[lane] = first + (lane < lanes ? lane : lanes - 1);
-            r[lane] = all->r + window[lane] * all->length * n;
+            r[lane] = all->r + (ptrdiff_t)window[lane] * all->apart;
         }
         VG(begin)(n, all, r, window, &s);
         for (size_t t = 0; t < all->end; t++) {
