@@ -32,7 +32,7 @@ class Schema:
 _TIME = Column("time", "s", "since the first frame of the recording")
 _SEGMENT = Column("segment", "", "number of the gap-free stretch, from 0")
 _WINDOW = (
-    Column("window", "", "number from 0; -1: the longest stretch without a gap, often the whole record"),
+    Column("window", "", "number from 0; -1: the longest stretch without a gap, at most its first 1,000,000 samples"),
     Column("start", "", "first sample of the window in the volatility series"),
     Column("stop", "", "one past the last sample"),
     Column("time_start", "s", "time of the first sample"),
@@ -103,7 +103,7 @@ _ALL = (
         Column("status", "", "as in garch and dcc"),
         Column("windows", "", "number of windows; none has no row"),
     )),
-    Schema("weights", 2, "weights of each model and mode, one row a sample of the volatility series", (
+    Schema("weights", 2, "weights of each model and mode (`blocks` in the metadata), one row a sample of the series", (
         _TIME, _SEGMENT,
         Column("model", "", "dcc or ccc"),
         Column("mode", "", "in_sample or causal"),
