@@ -1,3 +1,4 @@
+# cython: boundscheck=False, wraparound=False
 """Binding of c/dcc.h: checks nothing, computes nothing."""
 
 from libc.stddef cimport ptrdiff_t

@@ -53,13 +53,13 @@ def fit_dcc_windows(
 ) -> DccWindows:
     """Fit DCC(1,1) to each of K windows: `fit_dcc` in a loop. See vgyro.engine.native.dcc.fit_dcc_windows."""
     fits, statistics = [], []
-    for window, *parameters, codes in zip(r, omega, alpha, beta, status, strict=True):
-        window = np.ascontiguousarray(window, dtype=float)
-        variance = garch_variance(window, *parameters)
+    for k in range(len(r)):
+        window = np.ascontiguousarray(r[k], dtype=float)
+        variance = garch_variance(window, omega[k], alpha[k], beta[k])
         z = window / np.sqrt(variance)
         nothing = np.full(window.shape[1], np.nan)
-        names = np.array(GARCH_STATUSES, dtype=object)[codes]
-        margins = GarchFit(*parameters, nothing, nothing, variance, names)
+        names = np.array(GARCH_STATUSES, dtype=object)[status[k]]
+        margins = GarchFit(omega[k], alpha[k], beta[k], nothing, nothing, variance, names)
         fits.append(fit_dcc(z, window, margins))
         statistics.append(constant_correlation_statistic(z, lags))
     n = r.shape[2]

@@ -41,7 +41,7 @@ static int open_test(dcc_memory *m, ptrdiff_t size, ptrdiff_t n) {
 static int open_errors(dcc_memory *m, ptrdiff_t samples, ptrdiff_t n) {
     const ptrdiff_t blocks = (samples + DCC_BLOCK - 1) / DCC_BLOCK;
     m->checkpoint = vectors(blocks * DCC_TRI(n));
-    m->block = vectors(DCC_BLOCK * (2 * DCC_TRI(n) + n));
+    m->block = vectors(DCC_BLOCK * DCC_KEPT(n));
     m->each = numbers(2 * samples);
     return m->checkpoint && m->block && m->each;
 }

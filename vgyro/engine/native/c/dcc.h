@@ -8,7 +8,9 @@
 #define DCC_MAX 32
 #define DCC_TRI(n) ((n) * ((n) + 1) / 2)
 #define DCC_AT(i, j) ((i) >= (j) ? DCC_TRI(i) + (j) : DCC_TRI(j) + (i))
+/* The way back in time goes by blocks of samples; of each sample W, Q and z - √q u are kept (dcc_adjoint.h). */
 #define DCC_BLOCK 64
+#define DCC_KEPT(n) (2 * DCC_TRI(n) + (n))
 
 enum { DCC_FITTED = 0, DCC_NOT_FINITE = 1, DCC_SINGULAR = 2 };
 enum { DCC_A = 0, DCC_B, DCC_LIKELIHOOD, DCC_LIKELIHOOD_CCC, DCC_STATISTIC, DCC_VALUES };
@@ -42,6 +44,12 @@ typedef struct {
     v4 mantissa;
     m4 exponent;
 } dcc_product;
+
+/* L_c of the samples so far, lane by lane: Π det Q, Π Π q_i, Σ v'Q⁻¹v, and the smallest pivot. */
+typedef struct {
+    dcc_product det, spread;
+    v4 square, smallest;
+} dcc_likelihood;
 
 /* Memory of one call, for the windows one after another. */
 typedef struct {

@@ -6,15 +6,13 @@
    ∂L_c/∂φ = Σ λ_t (1, e²_{t-1}, h_{t-1}).
    A is kept at the start of each block of samples, from which the block is computed again on the way back. */
 
-/* What a block keeps of a sample: W, Q, z - √q u. */
-#define DCC_KEPT(n) (2 * DCC_TRI(n) + (n))
-
 VG_INLINE void DCC(spread_sample)(const int n, const double *from, v4 *z) {
     for (int i = 0; i < n; i++) z[i] = v4_set(from[i]);
 }
 
-VG_INLINE void DCC(block_forward)(const int n, const dcc_window *w, v4 a, v4 b, ptrdiff_t start, ptrdiff_t stop, v4 *away,
-                                  v4 *kept) {
+/* Samples start..stop - 1, from A of the first. */
+VG_INLINE void DCC(block_forward)(const int n, const dcc_window *w, v4 a, v4 b, ptrdiff_t start, ptrdiff_t stop,
+                                  v4 *away, v4 *kept) {
     v4 z[DCC_DIM], u[DCC_DIM];
     DCC(factor) f;
     for (ptrdiff_t t = start; t < stop; t++, kept += DCC_KEPT(n)) {

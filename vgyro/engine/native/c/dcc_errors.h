@@ -1,7 +1,7 @@
 /* Standard errors of (a, b): from the inverse Hessian, and two-step robust ones (Engle & Sheppard 2001). The stacked
    scores of the margins' φ and of ψ = (a, b) give A⁻¹BA⁻ᵀ/T, with A block triangular; its ψ block is that of the scores
-   s_ψ - A21 A11⁻¹ s_φ  with bread A22 = ∂²L_c/∂ψ². A22 and A21 = ∂²L_c/∂ψ∂φ' are central differences of exact gradients.
-   S is held fixed. */
+   s_ψ - A21 A11⁻¹ s_φ with bread A22 = ∂²L_c/∂ψ². A22 and A21 = ∂²L_c/∂ψ∂φ' are central differences of exact
+   gradients. S is held fixed. */
 
 /* Where (a, b) moves for the differences. */
 VG_INLINE double VG(dcc_small_step)(double a, double b) {
@@ -14,7 +14,8 @@ VG_INLINE double VG(dcc_positive_root)(double x) { return x > 0 ? sqrt(x) : NAN;
 VG_INLINE double VG(dcc_difference)(v4 x, int k, double step) { return (x[2 * k] - x[2 * k + 1]) / (2 * step); }
 
 /* A11⁻¹A21' of a group of series: weight [2, 3]. */
-VG_INLINE void VG(dcc_margin_weight)(const VG(dcc_group) *g, const v4 *hessian, const v4 *cross, double step, v4 *weight) {
+VG_INLINE void VG(dcc_margin_weight)(const VG(dcc_group) *g, const v4 *hessian, const v4 *cross, double step,
+                                     v4 *weight) {
     for (int i = 0; i < 6; i++) weight[i] = v4_set(0);
     for (int lane = 0; lane < g->count; lane++)
         for (int k = 0; k < 2; k++) {

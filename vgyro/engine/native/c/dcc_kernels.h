@@ -19,6 +19,26 @@ VG_INLINE double VG(dcc_log)(const dcc_product *product) {
     return sum;
 }
 
+VG_INLINE dcc_likelihood VG(dcc_open)(void) {
+    dcc_product one = {v4_set(1), {0}};
+    return (dcc_likelihood){one, one, v4_set(0), v4_set(1)};
+}
+
+/* Forget what the first lane has seen. */
+VG_INLINE void VG(dcc_forget)(dcc_likelihood *l) {
+    l->det.mantissa[0] = l->spread.mantissa[0] = 1;
+    l->det.exponent[0] = l->spread.exponent[0] = 0;
+    l->square[0] = 0;
+}
+
+/* L_c / T, NaN where some Q_t was not positive definite. */
+VG_INLINE double VG(dcc_close)(const dcc_likelihood *l, const dcc_window *w) {
+    for (int k = 0; k < VG_LANES; k++)
+        if (!(l->smallest[k] > 0)) return NAN;
+    double log_det = VG(dcc_log)(&l->det) - VG(dcc_log)(&l->spread);
+    return -0.5 * (log_det + (VG(dcc_sum)(l->square) - w->squares)) / (double)w->samples;
+}
+
 #define DCC(name) VG(dcc6_##name)
 #define DCC_DIM 6
 #define DCC_N(window) 6
@@ -43,8 +63,8 @@ VG_INLINE double VG(dcc_log)(const dcc_product *product) {
 #undef DCC_N
 #undef DCC_UNROLL
 
-VG_INLINE double VG(dcc_value)(const dcc_window *w, double a, double b) {
-    return (w->n == 6 ? VG(dcc6_value) : VG(dccn_value))(w, a, b);
+VG_INLINE void VG(dcc_values)(const dcc_window *w, const double *a, double b, double *value) {
+    (w->n == 6 ? VG(dcc6_values) : VG(dccn_values))(w, a, b, value);
 }
 
 VG_INLINE double VG(dcc_score)(const dcc_window *w, double a, double b, double *gradient, double *outer, double *each) {

@@ -48,12 +48,13 @@ VG_NOINLINE void VG(dcc_paths)(const dcc_windows *all, ptrdiff_t k, double *h, d
 }
 
 /* Of a group: hessian [6] of the log-likelihood in (ω, α, β), lower triangle, summed over the samples.
-   With weight [2, 3] not NULL: instead each [samples, 2] loses weight · (score of the sample), summed over the group. */
+   With weight [2, 3], instead: each [samples, 2] loses weight · (score of the sample), summed over the group. */
 VG_INLINE void VG(dcc_margin_pass)(const dcc_memory *m, const VG(dcc_group) *g, v4 *hessian, const v4 *weight) {
     const dcc_window *w = &m->window;
     v4 slope[3] = {v4_set(1), v4_set(1), v4_set(1)}, second[3] = {v4_set(0), v4_set(0), v4_set(0)};
     for (ptrdiff_t t = 0; t < w->samples; t++) {
-        v4 h = VG(dcc_take)(g, w->h + t * w->n), z = VG(dcc_take)(g, w->z + t * w->n), square = z * z, inverse = 1.0 / h;
+        v4 h = VG(dcc_take)(g, w->h + t * w->n), z = VG(dcc_take)(g, w->z + t * w->n);
+        v4 square = z * z, inverse = 1.0 / h;
         v4 score = 0.5 * (square - 1.0) * inverse;
         if (weight)
             for (int k = 0; k < 2; k++) {

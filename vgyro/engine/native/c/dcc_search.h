@@ -28,7 +28,8 @@ VG_NOINLINE uint8_t VG(dcc_prepare)(const dcc_windows *all, ptrdiff_t k, dcc_mem
         double diagonal = VG(dcc_sum)(sums[DCC_AT(i, i)]);
         w->squares += diagonal;
         for (int j = 0; j < i; j++)
-            w->target[DCC_AT(i, j)] = VG(dcc_sum)(sums[DCC_AT(i, j)]) / sqrt(diagonal * VG(dcc_sum)(sums[DCC_AT(j, j)]));
+            w->target[DCC_AT(i, j)] =
+                VG(dcc_sum)(sums[DCC_AT(i, j)]) / sqrt(diagonal * VG(dcc_sum)(sums[DCC_AT(j, j)]));
         w->target[DCC_AT(i, i)] = 1;
     }
     return isfinite(w->squares) ? DCC_FITTED : DCC_NOT_FINITE;
@@ -113,8 +114,10 @@ VG_NOINLINE double VG(dcc_climb)(const dcc_window *w, double max, double *x) {
 /* The best a for a fixed b, and L_c / T there, from L_c at a = 0 and at two other places: a parabola's, which is kept
    away from 0 and from a + b = 1. */
 VG_INLINE double VG(dcc_profile)(const dcc_window *w, double constant, double b, double *a) {
-    const double high = fmin(0.6 * (1 - b), 0.25), low = 0.15 * high;
-    const double at_low = VG(dcc_value)(w, low, b), at_high = VG(dcc_value)(w, high, b);
+    const double high = fmin(0.6 * (1 - b), 0.25), low = 0.15 * high, places[2] = {low, high};
+    double value[2];
+    VG(dcc_values)(w, places, b, value);
+    const double at_low = value[0], at_high = value[1];
     *a = low;
     if (!isfinite(at_low)) return -INFINITY;
     if (!isfinite(at_high)) return at_low;
@@ -129,19 +132,25 @@ VG_INLINE void VG(dcc_try)(const dcc_window *w, double max, double a, double b, 
     if (value > *best) *best = value, memcpy(optimum, x, sizeof(x));
 }
 
-/* A small stateless grid: climbs from the peaks of the profile in b, and from the edge a + b = 1 where it is higher. */
+/* A small stateless grid: climbs from the peaks of the profile in b, and from near a + b = 1 where that is higher. */
 VG_NOINLINE void VG(dcc_maximise)(const dcc_window *w, const dcc_rules *rules, double *values) {
-    static const double grid[] = {0, 0.12, 0.3, 0.55, 0.75, 0.87, 0.94, 0.975, 0.99, 0.997}, edge[] = {0.005, 0.015, 0.05};
+    static const double grid[] = {0, 0.12, 0.3, 0.55, 0.75, 0.87, 0.94, 0.975, 0.99, 0.997}, edge[] = {0.005, 0.02};
     enum { POINTS = sizeof(grid) / sizeof(grid[0]), EDGES = sizeof(edge) / sizeof(edge[0]) };
-    const double constant = VG(dcc_value)(w, 0, 0), max = rules->persistence_max;
-    double best = constant, optimum[2] = {0, 0}, a[POINTS], profile[POINTS + 2];
+    const double max = rules->persistence_max;
+    double a[POINTS], profile[POINTS + 2], ends[EDGES][2], optimum[2] = {0, 0};
+    for (int k = 0; k < EDGES; k++) {
+        const double places[2] = {0, edge[k]};
+        VG(dcc_values)(w, places, max - edge[k], ends[k]);
+    }
+    const double constant = ends[0][0];
+    double best = constant;
     profile[0] = profile[POINTS + 1] = -INFINITY;
     for (int k = 0; k < POINTS; k++) profile[k + 1] = VG(dcc_profile)(w, constant, grid[k], &a[k]);
     for (int k = 0; k < POINTS; k++)
         if (profile[k + 1] > profile[k] && profile[k + 1] >= profile[k + 2])
             VG(dcc_try)(w, max, a[k], grid[k], &best, optimum);
     for (int k = 0; k < EDGES; k++)
-        if (VG(dcc_value)(w, edge[k], max - edge[k]) > best) VG(dcc_try)(w, max, edge[k], max - edge[k], &best, optimum);
+        if (ends[k][1] > best) VG(dcc_try)(w, max, edge[k], max - edge[k], &best, optimum);
     const int moves = best - constant >= rules->gain;
     values[DCC_A] = moves ? optimum[0] : 0;
     values[DCC_B] = moves ? optimum[1] : 0;
@@ -149,8 +158,8 @@ VG_NOINLINE void VG(dcc_maximise)(const dcc_window *w, const dcc_rules *rules, d
     values[DCC_LIKELIHOOD_CCC] = constant * (double)w->samples;
 }
 
-VG_NOINLINE uint8_t VG(dcc_fit)(const dcc_windows *all, const dcc_rules *rules, ptrdiff_t k, dcc_memory *m, double *values,
-                                double *target) {
+VG_NOINLINE uint8_t VG(dcc_fit)(const dcc_windows *all, const dcc_rules *rules, ptrdiff_t k, dcc_memory *m,
+                                double *values, double *target) {
     const int n = all->n;
     double root[DCC_MAX * DCC_MAX];
     if (VG(dcc_prepare)(all, k, m) == DCC_NOT_FINITE) return DCC_NOT_FINITE;

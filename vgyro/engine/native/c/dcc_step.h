@@ -40,7 +40,7 @@ VG_INLINE void DCC(factorise)(const int n, const v4 *q, const v4 *z, DCC(factor)
 }
 
 /* ∂l/∂Q = -½(Q⁻¹ - uu' + diag((u z/√q) - 1/q)), u = Q⁻¹v; places off the diagonal are doubled, so that
-   dl = Σ w dQ over the triangle. Q⁻¹ from QL'⁻¹... backwards, column by column: Q⁻¹L is upper triangular. */
+   dl = Σ w dQ over the triangle. Q⁻¹ column by column from the last, since Q⁻¹L is upper triangular. */
 VG_INLINE void DCC(weigh)(const int n, const v4 *z, const DCC(factor) *f, v4 *w, v4 *u) {
     DCC_UNROLL
     for (int j = n - 1; j >= 0; j--) {
