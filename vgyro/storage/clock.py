@@ -129,7 +129,7 @@ class Clock:
             frames, jumps = self._by_counter(kept)
             return frames, None, jumps
         counter = _with_last(self._last and self._last.counter, kept.counter)
-        if counter is None and elapsed is None:
+        if elapsed is None:
             return self._by_bytes(kept)
         if self._rule is None or counter is None:
             frames, jumps = self._by_stamp(elapsed)

@@ -158,7 +158,7 @@ def _block_series(
     fused : …/<recording>/<axis>/fused.parquet, with methods.parquet beside it and rates.parquet one folder up
     """
     array = read_array(fused.parents[1] / "rates.parquet", gyros, fused.parts[-2])
-    methods = fused_series(read_columns(fused.with_name("methods.parquet")))
+    methods = fused_series(fused, read_columns(fused.with_name("methods.parquet")))
     block_hz = array.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
 
     def means(columns: np.ndarray) -> Series:

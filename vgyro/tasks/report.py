@@ -109,7 +109,7 @@ def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tupl
                 tables[place.table] = read_columns(path)
         if tables:
             gyros = tuple(gyro.name for gyro in board.array(axis))
-            parts = {name: read_volatility(volatility[name], gyros) for name in DEFINITIONS if name in volatility}
+            parts = {str(name): read_volatility(volatility[name], gyros) for name in DEFINITIONS if name in volatility}
             arrays.append(ArrayPart(recording, axis, gyros, tables, parts))
     return tuple(arrays)
 
