@@ -12,7 +12,7 @@ from vgyro.validation import Problem, StrictModel, parse_model
 Definition = Literal["level", "demeaned", "difference", "residual"]
 Mode = Literal["in_sample", "causal"]
 CorrelationModel = Literal["dcc", "ccc"]
-Engine = Literal["reference"]
+Engine = Literal["native", "reference"]
 
 PARTIAL = "partial"
 
@@ -102,7 +102,8 @@ class Analysis(StrictModel):
     """Everything that a manifest may override for its data set."""
 
     engine: Engine = Field(
-        "reference", description="who computes; reference: the libraries arch, pymgarch, cvxpy, filterpy, allantools"
+        "native",
+        description="who computes; native: C kernels; reference: arch, pymgarch, cvxpy, filterpy, allantools (slow)",
     )
     integrity: IntegrityOptions = IntegrityOptions()
     rest: RestOptions = RestOptions()

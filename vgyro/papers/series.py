@@ -33,7 +33,7 @@ def series_figures(
     stretch: np.ndarray,
     rate_hz: float,
     options: MetricsOptions,
-    engine: str = "reference",
+    engine: str = "native",
 ) -> SeriesFigures:
     """Figures of block means, with limits, and improvement factors over the single gyros (L, eq. 18).
 
