@@ -9,6 +9,7 @@ import numpy as np
 CONVERGED = "converged"
 ALPHA_ZERO = "boundary: α = 0"
 BETA_ZERO = "boundary: β = 0"
+OMEGA_ZERO = "boundary: ω = 0"
 PERSISTENCE_ONE = "boundary: α + β = 1"
 A_ZERO = "boundary: a = 0"
 B_ZERO = "boundary: b = 0"
@@ -23,6 +24,7 @@ FAILED = "failed"
 
 GARCH_STATUSES = (
     CONVERGED, ALPHA_ZERO, BETA_ZERO, PERSISTENCE_ONE, OUTLIER_DOMINATED, NO_VARIANCE, TOO_SHORT, FAILED,
+    OMEGA_ZERO,
 )  # fmt: skip
 """What a fit of GARCH(1,1) may end as; a code of GarchWindows.status is a place in this tuple."""
 

@@ -13,6 +13,7 @@ from vgyro.engine.models import (
     CONVERGED,
     DCC_STATUSES,
     GARCH_STATUSES,
+    OMEGA_ZERO,
     OUTLIER_DOMINATED,
     PERSISTENCE_MAX,
     PERSISTENCE_ONE,
@@ -59,9 +60,10 @@ def outlier_dominated(r: np.ndarray) -> np.ndarray:
     return found
 
 
-def garch_status_codes(alpha: np.ndarray, beta: np.ndarray, outlier: np.ndarray) -> np.ndarray:
-    """uint8 codes of fits that ended at an optimum (α, β), all of one shape."""
+def garch_status_codes(omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, outlier: np.ndarray) -> np.ndarray:
+    """uint8 codes of fits that ended at an optimum (ω, α, β), all of one shape; ω in units of mean(e²)."""
     codes = np.full(np.shape(alpha), garch_code(CONVERGED), dtype=np.uint8)
+    codes[omega < 2 * OMEGA_MIN] = garch_code(OMEGA_ZERO)
     codes[beta < BETA_NEAR_ZERO] = garch_code(BETA_ZERO)
     codes[alpha + beta >= PERSISTENCE_NEAR_ONE] = garch_code(PERSISTENCE_ONE)
     codes[alpha < ALPHA_NEAR_ZERO] = garch_code(ALPHA_ZERO)

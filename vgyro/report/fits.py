@@ -22,6 +22,7 @@ STATUSES = {
     "boundary: α = 0": (series_mark(5), "GARCH: no memory of the squares; the variance is constant or a trend"),
     "boundary: β = 0": (series_mark(0), "GARCH: ARCH(1), memory of one sample only"),
     "boundary: α + β = 1": (series_mark(1), "GARCH: integrated, the variance never comes back to a mean"),
+    "boundary: ω = 0": (series_mark(2), "GARCH: the variance sinks all the way from where the window begins"),
     "boundary: a = 0": (series_mark(5), "DCC: nothing is gained over a constant correlation, which stands"),
     "boundary: b = 0": (series_mark(0), "DCC: memory of one sample only"),
     "boundary: a + b = 1": (series_mark(1), "DCC: integrated, the correlation never comes back to a mean"),

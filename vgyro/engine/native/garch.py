@@ -42,7 +42,7 @@ def fit_garch_windows(r: np.ndarray) -> GarchWindows:
     parameters = np.where(constant[..., None], [1.0, 0.0, 0.0], found["parameters"])
     cost = np.where(constant, 0.5, found["cost"])
     omega, alpha, beta = np.moveaxis(np.where(fitted[..., None], parameters, np.nan), -1, 0).copy()
-    status = rules.garch_status_codes(alpha, beta, _outliers(r, found["largest_share"], fitted))
+    status = rules.garch_status_codes(omega, alpha, beta, _outliers(r, found["largest_share"], fitted))
     status[found["outcome"] == _garch.FLAT] = rules.garch_code(NO_VARIANCE)
     status[found["outcome"] == _garch.FAILED] = rules.garch_code(FAILED)
     stderr = np.where((status == rules.garch_code(CONVERGED))[..., None], found["stderr"], np.nan)

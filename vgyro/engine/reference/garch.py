@@ -107,7 +107,7 @@ def _fit_column(column: np.ndarray, scale: float) -> _Series:
     if not results:
         return _Series(constant, nothing, FAILED)
     outlier = rules.outlier_dominated(e[:, None])
-    status = GARCH_STATUSES[rules.garch_status_codes(best[[1]], best[[2]], outlier)[0]]
+    status = GARCH_STATUSES[rules.garch_status_codes(best[[0]], best[[1]], best[[2]], outlier)[0]]
     return _Series(best, _stderr(fit) if status == CONVERGED else nothing, status)
 
 

@@ -8,7 +8,7 @@
 #define ROWS 8
 #define COLUMNS 4
 #define STARTS 6
-#define WORTH 0.2       /* share of the best gain so far that a start must have, unless there are */
+#define WORTH 0.5       /* share of the best gain so far that a start must have, unless there are */
 #define LARGE_OUTLIER 20 /* in units of the mean square */
 static const double row_beta[ROWS] = {0.0, 0.4, 0.7, 0.85, 0.93, 0.97, 0.99, 0.997};
 typedef struct {
@@ -18,10 +18,20 @@ static const columns_t usual = {{0.12, 0.35, 0.65, 0.95}, {0, 0, 0, 0}};
 static const columns_t robust = {{1, 1, 0.5, 0.1}, {0.2, 0.6, -0.2, -0.1}};
 
 /* What a row of the grid says of one series: the cost of its columns, and the sums that one step of scoring from the
-   constant variance needs (h = 1 + αg + δa, a_t = 1 + βa_{t-1}, y = e² - 1). */
+   constant variance needs: h = 1 + αg + δd, y = e² - 1, g_t = y_{t-1} + βg_{t-1}, d_t = 1 + βd_{t-1}. */
 typedef struct {
-    double cost[COLUMNS], yg, ya, gg, ga, aa, last;
+    double cost[COLUMNS], yg, yd, gg, gd, dd, last;
 } row_t;
+
+/* The sums that hold d_t = (1 - β^t)/(1 - β), from Σyβ^t, Σgβ^t, and β^t and g after the last sample; Σy = 0. */
+static void add_trend(row_t *row, double beta, ptrdiff_t samples, double power, double yp, double gp, double g) {
+    const double rest = 1 - beta, sum = (beta - power) / rest;
+    const double squares = (beta * beta - power * power) / (rest * (1 + beta));
+    row->yd = -yp / rest;
+    row->gd = (-g / rest - gp) / rest;
+    row->dd = ((double)samples - 2 * sum + squares) / (rest * rest);
+    row->last = (1 - power) / rest;
+}
 
 /* One series on its way: the points that its searches begin at, in order of their cost, and the best optimum so far. */
 typedef struct {
@@ -45,11 +55,11 @@ static void add_start(series_t *series, const double *x, double cost) {
 
 /* One step of scoring from the constant variance at a given β, α >= 0: the point, and the cost that it promises. */
 static double scored(const row_t *row, double beta, ptrdiff_t samples, double *x) {
-    double determinant = row->gg * row->aa - row->ga * row->ga;
-    double a = (row->yg * row->aa - row->ya * row->ga) / determinant;
-    double d = (row->ya * row->gg - row->yg * row->ga) / determinant;
-    if (!(a > 0)) a = 0, d = row->ya / row->aa;
-    double gain = 0.25 * (a * row->yg + d * row->ya) / (double)samples;
+    double determinant = row->gg * row->dd - row->gd * row->gd;
+    double a = (row->yg * row->dd - row->yd * row->gd) / determinant;
+    double d = (row->yd * row->gg - row->yg * row->gd) / determinant;
+    if (!(a > 0)) a = 0, d = row->yd / row->dd;
+    double gain = 0.25 * (a * row->yg + d * row->yd) / (double)samples;
     a = fmin(a, 0.9 * (1 - beta));
     d = fmin(fmax(d, fmax(-0.8 / row->last, -0.9 * (1 - beta - a))), 3 / row->last);
     x[0] = 1 - beta - a + d;

@@ -49,64 +49,62 @@ static void VG(load)(const vg_garch_data_t *data, ptrdiff_t first, ptrdiff_t sto
     for (ptrdiff_t t = 0; t < data->samples; t++) square[t] = v4_select(good, square[t] * scale, v4_set(1));
 }
 
-/* A row of the grid, of four series: h = 1 + αg + δd, g_t = y_{t-1} + βg_{t-1}, d_t = 1 + βd_{t-1}, y = e² - 1. One
-   division for four samples. */
+/* A row of the grid, of four series. With y = e² - 1 and g_t = y_{t-1} + βg_{t-1}: h = 1 + αg + excess·(1 - β^t). One
+   division for four samples. The sums for scoring belong to the usual columns only. */
 VG_INLINE void VG(row)(const v4 *square, ptrdiff_t samples, double beta, const columns_t *columns, int shifted,
                        row_t *out) {
-    const v4 one = v4_set(1), b = v4_set(beta), zero = v4_set(0);
-    v4 g = zero, d = one, a[COLUMNS], s[COLUMNS], product[COLUMNS], sum[COLUMNS];
-    v4 yg = zero, ya = zero, gg = zero, ga = zero, aa = zero;
+    const v4 one = v4_set(1), zero = v4_set(0), b = v4_set(beta), b4 = b * b * b * b;
+    v4 g = zero, p = b, a[COLUMNS], x[COLUMNS], product[COLUMNS], sum[COLUMNS];
+    v4 yg = zero, gg = zero, yp = zero, gp = zero;
     m4 power[COLUMNS];
     for (int i = 0; i < COLUMNS; i++) {
         a[i] = v4_set(columns->share[i] * (1 - beta));
-        s[i] = v4_set(columns->excess[i] * (1 - beta));
+        x[i] = v4_set(columns->excess[i]);
         product[i] = one;
         sum[i] = zero;
         power[i] = (m4){0, 0, 0, 0};
     }
     for (ptrdiff_t begin = 0; begin < samples; begin += BLOCK) {
         ptrdiff_t end = begin + BLOCK < samples ? begin + BLOCK : samples, t = begin;
-        v4 g0 = g, d0 = d;
         for (; t + 3 < end; t += 4) {
             v4 e0 = square[t], e1 = square[t + 1], e2 = square[t + 2], e3 = square[t + 3];
-            v4 g1 = (e0 - one) + b * g0, g2 = (e1 - one) + b * g1, g3 = (e2 - one) + b * g2;
-            v4 d1 = one + b * d0, d2 = one + b * d1, d3 = one + b * d2;
+            v4 y0 = e0 - one, y1 = e1 - one, y2 = e2 - one, y3 = e3 - one;
+            v4 g1 = y0 + b * g, g2 = y1 + b * g1, g3 = y2 + b * g2;
             for (int i = 0; i < COLUMNS; i++) {
-                v4 h0 = one + a[i] * g0, h1 = one + a[i] * g1, h2 = one + a[i] * g2, h3 = one + a[i] * g3;
-                if (shifted) h0 += s[i] * d0, h1 += s[i] * d1, h2 += s[i] * d2, h3 += s[i] * d3;
-                v4 p = h0 * h1, q = h2 * h3, all = p * q;
-                sum[i] += ((e0 * h1 + e1 * h0) * q + (e2 * h3 + e3 * h2) * p) / all;
+                v4 h0 = one + a[i] * g, h1 = one + a[i] * g1, h2 = one + a[i] * g2, h3 = one + a[i] * g3;
+                if (shifted) {
+                    h0 += x[i] * (one - p), h1 += x[i] * (one - p * b);
+                    h2 += x[i] * (one - p * b * b), h3 += x[i] * (one - p * b * b * b);
+                }
+                v4 left = h0 * h1, right = h2 * h3, all = left * right;
+                sum[i] += ((e0 * h1 + e1 * h0) * right + (e2 * h3 + e3 * h2) * left) / all;
                 product[i] *= all;
             }
-            g0 = (e3 - one) + b * g3;
-            d0 = one + b * d3;
+            if (!shifted) {
+                yg += (y0 * g + y1 * g1) + (y2 * g2 + y3 * g3);
+                gg += (g * g + g1 * g1) + (g2 * g2 + g3 * g3);
+                yp += p * (y0 + b * (y1 + b * (y2 + b * y3)));
+                gp += p * (g + b * (g1 + b * (g2 + b * g3)));
+            }
+            g = y3 + b * g3;
+            p *= b4;
         }
         for (; t < end; t++) {
+            v4 y = square[t] - one;
             for (int i = 0; i < COLUMNS; i++) {
-                v4 h = one + a[i] * g0;
-                if (shifted) h += s[i] * d0;
+                v4 h = one + a[i] * g;
+                if (shifted) h += x[i] * (one - p);
                 sum[i] += square[t] / h;
                 product[i] *= h;
             }
-            g0 = (square[t] - one) + b * g0;
-            d0 = one + b * d0;
+            yg += y * g;
+            gg += g * g;
+            yp += y * p;
+            gp += g * p;
+            g = y + b * g;
+            p *= b;
         }
         for (int i = 0; i < COLUMNS; i++) product[i] = VG(mantissa)(product[i], &power[i]);
-        for (t = begin; t < end; t++) { /* only the usual row is asked for these */
-            if (shifted) {
-                g = (square[t] - one) + b * g;
-                d = one + b * d;
-                continue;
-            }
-            v4 y = square[t] - one;
-            yg += y * g;
-            ya += y * d;
-            gg += g * g;
-            ga += g * d;
-            aa += d * d;
-            g = y + b * g;
-            d = one + b * d;
-        }
     }
     for (int lane = 0; lane < VG_LANES; lane++) {
         row_t *row = &out[lane * ROWS];
@@ -114,8 +112,8 @@ VG_INLINE void VG(row)(const v4 *square, ptrdiff_t samples, double beta, const c
             double log_h = VG(log_of)(product[i][lane], power[i][lane]);
             row->cost[i] = 0.5 * (log_h + sum[i][lane]) / (double)samples;
         }
-        row->yg = yg[lane], row->ya = ya[lane], row->gg = gg[lane], row->ga = ga[lane], row->aa = aa[lane];
-        row->last = d[lane];
+        add_trend(row, beta, samples, p[lane], yp[lane], gp[lane], g[lane]);
+        row->yg = yg[lane], row->gg = gg[lane];
     }
 }
 
@@ -136,7 +134,7 @@ static void VG(begin)(const v4 *square, ptrdiff_t samples, series_t *series) {
 /* Cost and derivatives at one point of each lane, by the recursions of dh/dx and d²h/dx² (coordinates of newton.h). */
 VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x, int with_outer, point_t *out) {
     const v4 one = v4_set(1), zero = v4_set(0), w = x[0], a = x[1], b = x[2];
-    v4 h = w + a + b, product = one, sum = zero;
+    v4 h = w + a + b, u = one / h, product = one, sum = zero;
     v4 dl = one, da = zero, db = zero, dlb = zero, dab = zero, dbb = zero;
     v4 g0 = zero, g1 = zero, g2 = zero, m0 = zero, m1 = zero, m2 = zero;
     v4 c00 = zero, c01 = zero, c02 = zero, c11 = zero, c12 = zero, c22 = zero;
@@ -145,7 +143,8 @@ VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x,
     for (ptrdiff_t begin = 0; begin < samples; begin += BLOCK) {
         ptrdiff_t end = begin + BLOCK < samples ? begin + BLOCK : samples;
         for (ptrdiff_t t = begin; t < end; t++) {
-            v4 e = square[t], u = one / h, z = e * u;
+            /* The division for the next sample begins before this one's sums: it takes as long as they do. */
+            v4 e = square[t], next = (w + a * e) + b * h, next_u = one / next, z = e * u;
             product *= h;
             sum += z;
             v4 p = u * dl, q = u * da, r = u * db, d = one - z, c = z + z - one;
@@ -177,7 +176,8 @@ VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x,
             db = (h - one) + b * db;
             da = (e - one) + b * da;
             dl = one + b * dl;
-            h = (w + a * e) + b * h;
+            h = next;
+            u = next_u;
         }
         product = VG(mantissa)(product, &power);
     }

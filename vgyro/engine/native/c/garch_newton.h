@@ -15,7 +15,7 @@ enum { SEARCHING, ENDED };
 #define PASSES 100
 #define RADIUS 0.3    /* of the first step: about the relative change of h */
 #define FLATTEST 1e-9 /* least curvature, in units of the metric */
-#define SAME 0.01     /* distance, in units of the metric, at which two optima count as one */
+#define SAME 0.03     /* distance, in units of the metric, at which two optima count as one */
 
 /* cost, slope and curvature of ½·mean(log h + e²/h); metric: diagonal of its expected curvature;
    outer: mean of the outer product of the scores. Symmetric matrices as 00 01 02 11 12 22. */
