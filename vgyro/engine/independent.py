@@ -46,7 +46,8 @@ def textbook_allan_deviation(rate: np.ndarray, rate_hz: float, tau: float, segme
         for first in range(0, count, PIECE):
             last = min(first + PIECE, count)
             before, middle, after = (running[first + shift : last + shift] for shift in (0, length, 2 * length))
-            total += float(np.sum(((after - middle) / length - (middle - before) / length) ** 2))
+            step = ((after - middle) - (middle - before)).astype(float) / length
+            total += float(np.sum(step**2))
         pairs += count
     return float(np.sqrt(total / (2 * pairs))) if pairs else float("nan")
 

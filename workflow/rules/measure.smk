@@ -44,7 +44,7 @@ rule crosscheck:
     benchmark:
         "results/benchmarks/{dataset}/{recording}/{axis}/crosscheck.tsv"
     resources:
-        mem_mb=4000,
+        mem_mb=1500,
         runtime=60,
     params:
         options=stage(

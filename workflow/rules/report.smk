@@ -14,7 +14,7 @@ rule report:
     benchmark:
         "results/benchmarks/{dataset}/report.tsv"
     resources:
-        mem_mb=4000,
+        mem_mb=1500,
         runtime=20,
     params:
         options=stage(
