@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
+from vgyro.engine import ENGINES
 from vgyro.engine.independent import nnls_weights
 from vgyro.errors import DataError, EngineError
 from vgyro.fusion import min_variance_weights, usable
@@ -26,11 +27,12 @@ def variance(H, w):
     return np.einsum("...i,...ij,...j->...", w, H, w)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("rho", "spread"), [(0.0, 0.1), (0.1, 0.3), (0.5, 1.0), (0.9, 3.0)])
-def test_against_nnls(rho, spread):
+def test_against_nnls(rho, spread, engine):
     # Expected: scipy.optimize.nnls on the equivalent least-squares problem.
     H = covariances(200, 6, rho, spread)
-    w = min_variance_weights(H)
+    w = min_variance_weights(H, engine)
     np.testing.assert_allclose(w, [nnls_weights(matrix) for matrix in H], atol=1e-12)
 
 
@@ -58,10 +60,11 @@ def test_two_gyros_closed_form(first, second, correlation):
     np.testing.assert_allclose(min_variance_weights(H), [expected, 1 - expected], atol=1e-10)
 
 
-def test_kkt_conditions_hold():
+@pytest.mark.parametrize("engine", ENGINES)
+def test_kkt_conditions_hold(engine):
     # Expected: H w = λ on the support, H w >= λ off it, λ = w'Hw.
     H = covariances(500, 6, 0.5, 1.0, seed=3)
-    w = min_variance_weights(H)
+    w = min_variance_weights(H, engine)
     gradient, level = np.einsum("kij,kj->ki", H, w), variance(H, w)[:, None]
     assert (w >= 0).all()
     np.testing.assert_allclose(w.sum(axis=1), 1.0, atol=1e-14)
@@ -103,22 +106,24 @@ def test_gyro_with_far_too_much_noise():
     np.testing.assert_allclose(min_variance_weights(H), [0.5, 0.5, 5e-11], atol=1e-13)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_not_finite_names_the_index(bad):
+def test_not_finite_names_the_index(bad, engine):
     H = np.broadcast_to(np.eye(3), (4, 2, 3, 3)).copy()
     H[2, 1, 0, 0] = bad
     with pytest.raises(EngineError, match=r"H\[2, 1\].*not finite"):
-        min_variance_weights(H)
+        min_variance_weights(H, engine)
 
 
 @pytest.mark.parametrize(
     "matrix", [[[1, 2], [2, 1]], [[1, 1], [1, 1]], [[0, 0], [0, 1]], [[-1, 0], [0, -1]], [[1, 0.5], [0.2, 1]]]
 )  # fmt: skip
-def test_not_positive_definite_names_the_index(matrix):
+@pytest.mark.parametrize("engine", ENGINES)
+def test_not_positive_definite_names_the_index(matrix, engine):
     H = np.stack([np.eye(2), np.array(matrix, dtype=float)])
     assert usable(H).tolist() == [True, False]
     with pytest.raises(EngineError, match=r"H\[1\]"):
-        min_variance_weights(H)
+        min_variance_weights(H, engine)
 
 
 def test_wrong_shape_and_unknown_engine():
