@@ -7,7 +7,7 @@ import pytest
 
 from vgyro.engine.covariance import conditional_covariance
 from vgyro.engine.independent import nnls_weights
-from vgyro.volatility import Window, WindowModels, longest_stretch, stretches, weights_of_windows, windows
+from vgyro.volatility import Window, WindowModels, stretches, weights_of_windows, windows
 from vgyro.volatility.rolling import rows_needed
 from vgyro.volatility.series import window_residuals
 
@@ -56,8 +56,6 @@ def test_windows_by_hand():
     assert windows(np.zeros(0), 4, 1) == []
     # Liu et al.: 3600 points, window 360, step 30.
     assert len(windows(np.zeros(3600), 360, 30)) == 109
-    assert longest_stretch(np.array([0, 0, 1, 1, 1, 2])) == (2, 5)
-    assert longest_stretch(np.zeros(0)).length == 0
 
 
 @pytest.mark.parametrize("modes", [("in_sample",), ("causal",), MODES])

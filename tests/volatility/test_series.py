@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.errors import ConfigError
-from vgyro.volatility import Window, block_means, detrended, residuals, window_residuals
+from vgyro.volatility import Window, block_means, detrended, window_residuals
 from vgyro.volatility.batches import fitted_batch, window_batch
 from vgyro.volatility.blocks import BlockMeans, RunFinder
 from vgyro.volatility.windowed import fitted_residuals
@@ -61,7 +61,6 @@ def test_full_rate_and_rates_that_do_not_divide():
 def test_nothing_at_rest_gives_an_empty_series():
     series = block_means(np.zeros((10, 3)), 1.0, 1.0, rest=np.zeros(10, dtype=bool))
     assert series.values.shape == (0, 3)
-    assert residuals(series.values, "level").shape == (0, 3)
 
 
 VALUES = np.column_stack([[1.0, 2.0, 4.0, 8.0, 16.0, 32.0], [3.0, 2.0, 1.0, 0.0, 1.0, 2.0]])
@@ -94,7 +93,7 @@ def test_residual_by_hand():
 def test_residuals_keep_a_correlation_that_can_be_inverted():
     # The plain mean as first pass would make them sum to zero at every t.
     values = np.random.default_rng(1).standard_normal((300, 6))
-    r = residuals(values, "residual", span=15)
+    r = window_residuals(values, Window(0, len(values)), "residual", 15)
     assert np.linalg.eigvalsh(np.corrcoef(r.T))[0] > 0.3
 
 
@@ -102,17 +101,8 @@ def test_residual_removes_slow_motion():
     t = np.arange(600)
     motion = 0.05 * t + np.sin(2 * np.pi * t / 200)
     noise = 0.01 * np.random.default_rng(2).standard_normal((600, 4))
-    r = residuals(noise + motion[:, None], "residual", span=15)[10:-10]
+    r = window_residuals(noise + motion[:, None], Window(0, 600), "residual", 15)[10:-10]
     np.testing.assert_allclose(r.std(axis=0), 0.01, rtol=0.35)
-
-
-def test_segments_of_a_whole_series():
-    segment = np.array([0, 0, 0, 1, 1, 1])
-    difference = residuals(VALUES, "difference", segment=segment)
-    assert np.isnan(difference[[0, 3]]).all()
-    np.testing.assert_array_equal(difference[[1, 2, 4, 5], 0], [1, 2, 8, 16])
-    demeaned = residuals(VALUES, "demeaned", segment=segment)
-    np.testing.assert_allclose(demeaned[3:, 1], [-1, 0, 1])
 
 
 def test_the_future_of_a_window_does_not_enter_it():

@@ -5,8 +5,8 @@ from vgyro.volatility.arch_lm import ArchLm, arch_lm, kurtosis
 from vgyro.volatility.dcc import Test, constant_correlation_test, dcc_correlation, fit_ccc, fit_dcc
 from vgyro.volatility.garch import fit_garch, garch_from_parameters, garch_variance
 from vgyro.volatility.rolling import WindowModels, WindowWeights, weights_of_windows
-from vgyro.volatility.series import Series, block_means, detrended, residuals, window_residuals
-from vgyro.volatility.stretches import Window, longest_stretch, stretches, windows
+from vgyro.volatility.series import Series, block_means, detrended, window_residuals
+from vgyro.volatility.stretches import Window, stretches, windows
 
 __all__ = [
     "ArchLm",
@@ -28,8 +28,6 @@ __all__ = [
     "garch_from_parameters",
     "garch_variance",
     "kurtosis",
-    "longest_stretch",
-    "residuals",
     "stretches",
     "weights_of_windows",
     "window_residuals",

@@ -9,7 +9,7 @@ import numpy as np
 from vgyro.config import Definition
 from vgyro.volatility.batches import span_about
 from vgyro.volatility.blocks import PIECE, BlockMeans, RunFinder, block_length
-from vgyro.volatility.stretches import Window, stretches
+from vgyro.volatility.stretches import Window
 
 
 @dataclass(frozen=True)
@@ -67,18 +67,6 @@ def block_means(
         np.concatenate([getattr(part, name) for part in parts]) for name in ("values", "time", "segment", "stretch")
     )
     return Series(values, when, where, stretch, rate_hz / length)
-
-
-def residuals(
-    values: np.ndarray, definition: Definition, span: int = 15, segment: np.ndarray | None = None
-) -> np.ndarray:
-    """r_t of a whole series, segment by segment, [M, N] deg/s. Rolling windows take `window_residuals` instead.
-
-    `demeaned` removes the mean of each segment; `difference` is NaN in the first sample of a segment.
-    """
-    segment = np.zeros(len(values), dtype=np.int32) if segment is None else segment
-    parts = [window_residuals(values, stretch, definition, span) for stretch in stretches(segment)]
-    return np.concatenate(parts) if parts else np.empty_like(values)
 
 
 def window_residuals(

@@ -33,11 +33,6 @@ def stretches(*marks: np.ndarray) -> list[Window]:
     return [Window(start, stop) for start, stop in pairwise(edges)]
 
 
-def longest_stretch(segment: np.ndarray) -> Window:
-    """The longest segment, the first of several; empty for an empty series."""
-    return max(stretches(segment), key=lambda stretch: stretch.length, default=Window(0, 0))
-
-
 @dataclass(frozen=True)
 class RollingWindows:
     """All full windows of a series: [k·step, k·step + length) from the start of each stretch, never across its border.
