@@ -8,8 +8,8 @@
 #define ROWS 8
 #define COLUMNS 4
 #define STARTS 6
-#define WORTH 0.5       /* share of the best gain so far that a start must have, unless there are */
 #define LARGE_OUTLIER 20 /* in units of the mean square */
+#define WORTH 0.5        /* share of the best gain so far that a start must have; with large outliers all are tried */
 static const double row_beta[ROWS] = {0.0, 0.4, 0.7, 0.85, 0.93, 0.97, 0.99, 0.997};
 typedef struct {
     double share[COLUMNS], excess[COLUMNS];
@@ -40,6 +40,7 @@ typedef struct {
     int count, next, outlier;
 } series_t;
 
+/* Keeps the starts in order of their cost, the best STARTS of them. */
 static void add_start(series_t *series, const double *x, double cost) {
     int place = series->count < STARTS ? series->count++ : STARTS;
     for (; place > 0 && series->cost[place - 1] > cost; place--)
@@ -112,9 +113,9 @@ static int next_search(series_t *series, newton_t *newton) {
     return 0;
 }
 
-/* Bollerslev & Wooldridge's robust standard errors of (w, a, b): H⁻¹ (ΣSS') H⁻¹. NaN where H is not positive definite. */
+/* Bollerslev & Wooldridge's robust standard errors of (ω, α, β), H⁻¹(ΣSS')H⁻¹; NaN where H is not positive definite. */
 static void standard_errors(const point_t *at, ptrdiff_t samples, double *out) {
-    /* rows: w, a, b in the coordinates (level, a, b) */
+    /* rows: ω, α, β in the coordinates (level, α, β) */
     const double rows[3][3] = {{1, -1, -1}, {0, 1, 0}, {0, 0, 1}};
     for (int i = 0; i < 3; i++) {
         double minus[3] = {-rows[i][0], -rows[i][1], -rows[i][2]}, solved[3], spread[3];

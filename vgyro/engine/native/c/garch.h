@@ -1,4 +1,4 @@
-/* GARCH(1,1) of many series: h_t = w + a e_{t-1}^2 + b h_{t-1}, e_0^2 = h_0 = mean(e^2) = 1 (each in its own units). */
+/* GARCH(1,1) of many series: h_t = ω + αe²_{t-1} + βh_{t-1}, e²_0 = h_0 = mean(e²) = 1, each in its own units. */
 #ifndef VG_GARCH_H
 #define VG_GARCH_H
 
@@ -30,7 +30,7 @@ typedef struct {
 int vg_garch_fit(const vg_garch_data_t *data, const vg_garch_search_t *search, ptrdiff_t first, ptrdiff_t stop,
                  vg_garch_fit_t *fit);
 
-/* h[t][n], of one window; w in the units of r². */
+/* h[t][n], of one window; start = h of its first sample and ω in the units of r². */
 void vg_garch_variance(const vg_garch_data_t *data, const double *start, const double *omega, const double *alpha,
                        const double *beta, double *variance);
 

@@ -17,7 +17,8 @@ static void VG(load)(const vg_garch_data_t *data, ptrdiff_t first, ptrdiff_t sto
     const double *from[VG_LANES];
     for (int lane = 0; lane < VG_LANES; lane++) {
         ptrdiff_t number = first + lane < stop ? first + lane : stop - 1;
-        from[lane] = data->r + number / data->series * data->window_stride + number % data->series * data->series_stride;
+        from[lane] = data->r + number / data->series * data->window_stride;
+        from[lane] += number % data->series * data->series_stride;
     }
     v4 sum = v4_set(0), low = v4_set(INFINITY), high = v4_set(-INFINITY), most = v4_set(0);
     m4 finite = sum == sum;
@@ -43,8 +44,8 @@ static void VG(load)(const vg_garch_data_t *data, ptrdiff_t first, ptrdiff_t sto
         fit[lane].mean_square = mean[lane];
         fit[lane].largest_share = most[lane] / sum[lane];
     }
-    m4 good = {fit[0].outcome == VG_GARCH_FITTED ? -1 : 0, fit[1].outcome == VG_GARCH_FITTED ? -1 : 0,
-               fit[2].outcome == VG_GARCH_FITTED ? -1 : 0, fit[3].outcome == VG_GARCH_FITTED ? -1 : 0};
+    m4 good;
+    for (int lane = 0; lane < VG_LANES; lane++) good[lane] = fit[lane].outcome == VG_GARCH_FITTED ? -1 : 0;
     v4 scale = v4_set(1) / v4_select(good, mean, v4_set(1));
     for (ptrdiff_t t = 0; t < data->samples; t++) square[t] = v4_select(good, square[t] * scale, v4_set(1));
 }
@@ -131,7 +132,8 @@ static void VG(begin)(const v4 *square, ptrdiff_t samples, series_t *series) {
     }
 }
 
-/* Cost and derivatives at one point of each lane, by the recursions of dh/dx and d²h/dx² (coordinates of newton.h). */
+/* Cost and derivatives at one point of each lane, by the recursions of dh/dx and d²h/dx², in the coordinates of
+   garch_newton.h: dl = dh/dlevel, da = dh/dα, db = dh/dβ, and dlb, dab, dbb their derivatives with respect to β. */
 VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x, int with_outer, point_t *out) {
     const v4 one = v4_set(1), zero = v4_set(0), w = x[0], a = x[1], b = x[2];
     v4 h = w + a + b, u = one / h, product = one, sum = zero;
@@ -181,14 +183,19 @@ VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x,
         }
         product = VG(mantissa)(product, &power);
     }
+    const v4 slope[3] = {g0, g1, g2}, metric[3] = {m0, m1, m2}, curvature[6] = {c00, c01, c02, c11, c12, c22};
+    const v4 outer[6] = {s00, s01, s02, s11, s12, s22};
     const double half = 0.5 / (double)samples;
     for (int lane = 0; lane < VG_LANES; lane++) {
-        const v4 *sums[] = {&g0, &g1, &g2, &c00, &c01, &c02, &c11, &c12, &c22, &m0, &m1, &m2};
-        double *to = out[lane].slope; /* slope, curvature, metric follow each other */
         out[lane].cost = half * (VG(log_of)(product[lane], power[lane]) + sum[lane]);
-        for (int i = 0; i < 12; i++) to[i] = half * (*sums[i])[lane];
-        const v4 *squares[] = {&s00, &s01, &s02, &s11, &s12, &s22};
-        for (int i = 0; i < 6; i++) out[lane].outer[i] = 0.5 * half * (*squares[i])[lane];
+        for (int i = 0; i < 3; i++) {
+            out[lane].slope[i] = half * slope[i][lane];
+            out[lane].metric[i] = half * metric[i][lane];
+        }
+        for (int i = 0; i < 6; i++) {
+            out[lane].curvature[i] = half * curvature[i][lane];
+            out[lane].outer[i] = 0.5 * half * outer[i][lane];
+        }
     }
 }
 
@@ -196,15 +203,9 @@ static __attribute__((noinline)) void VG(look)(const v4 *square, ptrdiff_t sampl
     VG(derivatives)(square, samples, x, 0, out);
 }
 
-static __attribute__((noinline)) void VG(look_with_outer)(const v4 *square, ptrdiff_t samples, const v4 *x, point_t *out) {
+static __attribute__((noinline)) void VG(look_with_outer)(const v4 *square, ptrdiff_t samples, const v4 *x,
+                                                          point_t *out) {
     VG(derivatives)(square, samples, x, 1, out);
-}
-
-/* Puts a series into a lane of the work. */
-static void VG(fill)(const v4 *square, int from, ptrdiff_t samples, v4 *work, int to) {
-    const double *source = (const double *)square + from;
-    double *target = (double *)work + to;
-    for (ptrdiff_t t = 0; t < samples; t++) target[VG_LANES * t] = source[VG_LANES * t];
 }
 
 /* All searches of the series: a lane that is done with one takes the next. */
@@ -223,7 +224,8 @@ static void VG(search)(const v4 *square, ptrdiff_t samples, const vg_garch_searc
             while (in_lane[lane] < 0 && next < count) {
                 if (next_search(&series[next], &newton[lane])) {
                     in_lane[lane] = next;
-                    VG(fill)(square + next / VG_LANES * samples, (int)(next % VG_LANES), samples, work, lane);
+                    const v4 *four = square + next / VG_LANES * samples;
+                    for (ptrdiff_t t = 0; t < samples; t++) work[t][lane] = four[t][next % VG_LANES];
                 }
                 next++;
             }
@@ -237,7 +239,7 @@ static void VG(search)(const v4 *square, ptrdiff_t samples, const vg_garch_searc
             series_t *of = &series[in_lane[lane]];
             newton_t *n = &newton[lane];
             int state = newton_next(n, &seen[lane], search->omega_min, search->persistence_max);
-            if (state == SEARCHING && !is_near(n, of->best, of->best_cost)) continue;
+            if (state == SEARCHING && !(of->best_cost < 0.5 && is_near(n, of->best, of->best_cost))) continue;
             if (n->at.cost < of->best_cost) {
                 of->best_cost = n->at.cost;
                 memcpy(of->best, n->x, sizeof n->x);
@@ -272,7 +274,8 @@ static void VG(fit_piece)(const vg_garch_data_t *data, const vg_garch_search_t *
 
 static int VG(garch_fit)(const vg_garch_data_t *data, const vg_garch_search_t *search, ptrdiff_t first, ptrdiff_t stop,
                          vg_garch_fit_t *fit) {
-    const size_t samples = (size_t)data->samples, padded = ((size_t)(stop - first) + VG_LANES - 1) / VG_LANES * VG_LANES;
+    const size_t samples = (size_t)data->samples;
+    const size_t padded = ((size_t)(stop - first) + VG_LANES - 1) / VG_LANES * VG_LANES;
     v4 *square = aligned_alloc(sizeof(v4), padded * samples * sizeof(double));
     v4 *work = aligned_alloc(sizeof(v4), samples * sizeof(v4));
     series_t *series = malloc(padded * sizeof *series);

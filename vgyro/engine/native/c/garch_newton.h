@@ -1,7 +1,8 @@
-/* One trust-region Newton search for (w, a, b), told the cost and its derivatives at each point that it asks for.
+/* One search for (ω, α, β) by Newton's method within a trust region and the constraints. It is told the cost and its
+   derivatives at each point that it asks for.
 
-   Derivatives and steps are in the coordinates (level, a, b), w = level - a - b: along the ridge of constant variance
-   the data say nothing of b, and here that direction is an axis. */
+   Derivatives and steps are in the coordinates (level, α, β), ω = level - α - β: along the ridge of constant variance
+   the data say nothing of β, and here that direction is an axis. */
 
 #ifndef VG_GARCH_NEWTON_H
 #define VG_GARCH_NEWTON_H
@@ -11,11 +12,11 @@
 
 enum { SEARCHING, ENDED };
 #define TOLERANCE 1e-8 /* predicted gain a sample of the last step; what is left after it is of higher order */
-#define STALLED 1e-12
-#define PASSES 100
-#define RADIUS 0.3    /* of the first step: about the relative change of h */
-#define FLATTEST 1e-9 /* least curvature, in units of the metric */
-#define SAME 0.03     /* distance, in units of the metric, at which two optima count as one */
+#define STALLED 1e-12  /* the same where the quadratic model had to be bent or damped */
+#define PASSES 100     /* at most, for one search */
+#define RADIUS 0.3     /* of the first step: about the relative change of h */
+#define FLATTEST 1e-9  /* least curvature, in units of the metric */
+#define SAME 0.03      /* distance, in units of the metric, at which two optima count as one */
 
 /* cost, slope and curvature of ½·mean(log h + e²/h); metric: diagonal of its expected curvature;
    outer: mean of the outer product of the scores. Symmetric matrices as 00 01 02 11 12 22. */
@@ -23,6 +24,8 @@ typedef struct {
     double cost, slope[3], curvature[6], metric[3], outer[6];
 } point_t;
 
+/* x is the best point so far, `at` what was seen there; trial = x + step is the point that the search asks for.
+   bend: see descend; convex, exact: did the model of the step need no bending, and no damping either? */
 typedef struct {
     double x[3], trial[3], step[3];
     point_t at;
@@ -31,7 +34,7 @@ typedef struct {
     int convex, exact, passes;
 } newton_t;
 
-/* Constraints on a step, C·s >= -room: w, a, b, and a + b. */
+/* Constraints on a step s, normal·s >= -room: of ω, α, β, and α + β; and the directions that leave each as it is. */
 static const double normal[4][3] = {{1, -1, -1}, {0, 1, 0}, {0, 0, 1}, {0, -1, -1}};
 static const double within[4][2][3] = {
     {{1, 1, 0}, {1, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 1, 0}}, {{1, 0, 0}, {0, 1, -1}}};
