@@ -116,7 +116,9 @@ def test_parameters_are_those_of_the_window(tables):
     window = noise(300, 3)[50:170]
     fit = fit_garch(window - window.mean(axis=0), "reference")
     rows = found["garch"]["window"] == 1
-    np.testing.assert_allclose(found["garch"]["omega"][rows], fit.omega, rtol=1e-5)
+    np.testing.assert_allclose(found["garch"]["log_likelihood"][rows], fit.log_likelihood, rtol=1e-9)
+    # The rounding of a block mean moves an ω near 0 along a flat likelihood; the variance is 0.0016.
+    np.testing.assert_allclose(found["garch"]["omega"][rows], fit.omega, rtol=1e-5, atol=1e-8)
     assert found["garch"]["status"][rows].tolist() == fit.status.tolist()
 
 
