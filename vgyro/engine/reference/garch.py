@@ -72,18 +72,14 @@ def fit_garch(r: np.ndarray) -> GarchFit:
 def fit_garch_windows(r: np.ndarray) -> GarchWindows:
     """fit_garch of each window of r [K, T, N], deg/s."""
     windows, _, n = r.shape
-    found = GarchWindows(
-        *(np.full((windows, n), np.nan) for _ in range(3)),
-        stderr=np.full((windows, n, 3), np.nan),
-        log_likelihood=np.full((windows, n), np.nan),
-        status=np.zeros((windows, n), dtype=np.uint8),
-    )
+    omega, alpha, beta, likelihood = (np.full((windows, n), np.nan) for _ in range(4))
+    stderr, status = np.full((windows, n, 3), np.nan), np.zeros((windows, n), dtype=np.uint8)
     for k, window in enumerate(r):
         fit = fit_garch(window)
-        for name in ("omega", "alpha", "beta", "stderr", "log_likelihood"):
-            getattr(found, name)[k] = getattr(fit, name)
-        found.status[k] = [rules.garch_code(status) for status in fit.status]
-    return found
+        omega[k], alpha[k], beta[k], likelihood[k] = fit.omega, fit.alpha, fit.beta, fit.log_likelihood
+        stderr[k] = fit.stderr
+        status[k] = [rules.garch_code(name) for name in fit.status]
+    return GarchWindows(omega, alpha, beta, stderr, likelihood, status)
 
 
 def _fit_column(column: np.ndarray, scale: float) -> _Series:
