@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.metrics.allan import floating, stretches
+from vgyro.metrics.allan import split_segments
 
 LARGEST_LAG_SHARE = 4
 WINDOW_FACTOR = 5
 FIRST_LAGS, MORE_LAGS = 1 << 10, 16
 PARTS = 4  # an FFT is so many times as long as the lags
-CHUNK = 1 << 16  # samples of all gyros at once
+HELD = 3  # series that are held while the others pass
 BATCH = 1 << 18  # samples that are transformed together
 
 
@@ -28,7 +28,7 @@ class Correlation:
 
 
 def correlation_matrix(
-    rate: np.ndarray,
+    series: Sequence[np.ndarray],
     rate_hz: float,
     segment: np.ndarray | None = None,
     confidence: float = 0.95,
@@ -36,7 +36,7 @@ def correlation_matrix(
 ) -> Correlation:
     """Correlation factors c_ij = cov(g_i, g_j) / √(cov(g_i, g_i) cov(g_j, g_j)) of the sampled noise.
 
-    rate    : array [T, N], deg/s, at rest;  rate_hz : kept for symmetry with the other figures
+    series  : N arrays [T], deg/s, at rest; four of them at a time are held;  rate_hz : as in the other figures
     segment : array [T] int; each stretch's mean is removed (a rest pose's own bias is not noise)
     truth   : array [T], deg/s, taken off every gyro where the board moves; None: nothing
     returns : Correlation; limits by Fisher's z with n independent samples, n = T / (1 + 2 Σ_k ρ_i(k) ρ_j(k)): drift
@@ -46,14 +46,13 @@ def correlation_matrix(
     from scipy.special import ndtri
 
     del rate_hz
-    noise = _Noise.of(rate, segment, truth)
-    number = rate.shape[1]
-    covariance = sum((part.T @ part for part in noise.parts()), np.zeros((number, number)))
+    noise = _Noise(series, segment, truth)
+    covariance, functions, samples = _second_moments(noise)
     scale = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         value = np.clip(covariance / np.outer(scale, scale), -1, 1)
     value[scale == 0] = value[:, scale == 0] = np.nan
-    effective = _effective_samples(noise)
+    effective = _effective_samples(noise, functions, samples)
     with np.errstate(divide="ignore", invalid="ignore"):
         z = np.arctanh(value)
         half = ndtri(0.5 + confidence / 2) / np.sqrt(np.maximum(effective - 3, 0))
@@ -68,53 +67,55 @@ def correlation_matrix(
 
 @dataclass(frozen=True)
 class _Noise:
-    """Rates [T, N] less the truth [T] less the mean [N] of each stretch, made in parts: it may be too long to hold."""
+    """What of N series [T] is noise: without the truth [T] and the mean of each stretch. Made when it is asked for."""
 
-    rate: np.ndarray
+    series: Sequence[np.ndarray]
+    segment: np.ndarray | None
     truth: np.ndarray | None
-    cuts: list[tuple[int, int]]
-    means: list[np.ndarray]
-
-    @classmethod
-    def of(cls, rate: np.ndarray, segment: np.ndarray | None, truth: np.ndarray | None) -> _Noise:
-        rate = floating(rate)
-        cuts = stretches(np.zeros(len(rate), np.int8) if segment is None else segment)
-        means = [rate[start:stop].mean(axis=0, dtype=float) for start, stop in cuts]
-        if truth is not None:
-            means = [mean - truth[start:stop].mean() for (start, stop), mean in zip(cuts, means, strict=True)]
-        return cls(rate, truth, cuts, means)
-
-    def parts(self) -> Iterator[np.ndarray]:
-        """All gyros [≤ CHUNK, N], in order."""
-        for (start, stop), mean in zip(self.cuts, self.means, strict=True):
-            for first in range(start, stop, CHUNK):
-                part = self.rate[first : min(first + CHUNK, stop)] - mean
-                yield part if self.truth is None else part - self.truth[first : first + len(part), None]
 
     def column(self, gyro: int) -> np.ndarray:
         """One gyro [T]."""
-        column = self.rate[:, gyro].astype(float)
-        for (start, stop), mean in zip(self.cuts, self.means, strict=True):
-            column[start:stop] -= mean[gyro]
+        column = self.series[gyro].astype(float)
         if self.truth is not None:
             column -= self.truth
+        for piece in split_segments(column, self.segment):
+            piece -= piece.mean()
         return column
 
 
-def _effective_samples(noise: _Noise) -> np.ndarray:
+def _second_moments(noise: _Noise) -> tuple[np.ndarray, list[np.ndarray], int]:
+    """Σ g_i g_j [N, N], the autocorrelation of each at the first lags, and the number of samples."""
+    number, samples = len(noise.series), 0
+    covariance = np.zeros((number, number))
+    functions: list[np.ndarray] = []
+    held: list[np.ndarray] = []
+    for first in range(0, number, HELD):
+        held.clear()
+        for gyro in range(first, min(first + HELD, number)):
+            held.append(noise.column(gyro))
+            samples = len(held[-1])
+            functions.append(autocorrelation(held[-1], min(FIRST_LAGS, samples // LARGEST_LAG_SHARE)))
+        for other in range(first, number):
+            column = held[other - first] if other < first + HELD else noise.column(other)
+            for row, values in enumerate(held, first):
+                covariance[row, other] = covariance[other, row] = float(values @ column)
+            del column
+    return covariance, functions, samples
+
+
+def _effective_samples(noise: _Noise, functions: list[np.ndarray], samples: int) -> np.ndarray:
     """T / (1 + 2 Σ ρ_i(k) ρ_j(k)) [N, N], by as many lags as every sum needs to end, at most T/4."""
-    samples, number = noise.rate.shape
+    number = len(functions)
     effective = np.full((number, number), float(samples))
     if samples < WINDOW_FACTOR * LARGEST_LAG_SHARE:
         return effective
-    most = samples // LARGEST_LAG_SHARE
-    lags = min(FIRST_LAGS, most)
+    lags, most = len(functions[0]), samples // LARGEST_LAG_SHARE
     while True:
-        functions = [autocorrelation(noise.column(gyro), lags) for gyro in range(number)]
         sums = [_sum_to_window(functions[i] * functions[j]) for i in range(number) for j in range(i, number)]
         if lags == most or all(ended for _, ended in sums):
             break
         lags = min(lags * MORE_LAGS, most)
+        functions = [autocorrelation(noise.column(gyro), lags) for gyro in range(number)]
     lengths = iter(sums)
     for row in range(number):
         for column in range(row, number):
@@ -124,8 +125,8 @@ def _effective_samples(noise: _Noise) -> np.ndarray:
 
 def autocorrelation(centred: np.ndarray, lags: int) -> np.ndarray:
     """Autocorrelation at lags 0 … lags - 1 of a series without mean (divided by T); zeros if it is constant."""
-    function = lagged_products(centred, centred, lags)
-    return function / function[0] if function[0] > 0 else np.zeros(lags)
+    function = lagged_products(centred, centred, lags) if lags else np.empty(0)
+    return function / function[0] if lags and function[0] > 0 else np.zeros(lags)
 
 
 def lagged_products(first: np.ndarray, second: np.ndarray, lags: int) -> np.ndarray:

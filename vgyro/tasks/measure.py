@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import overload
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from vgyro.metrics import (
 )
 from vgyro.storage.tables import Provenance, read_columns, write_table
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.rates_file import ArrayFile, chosen_rows, read_array, read_column
+from vgyro.tasks.rates_file import ArrayFile, FileColumns, read_array
 
 SPECTRUM_POINTS = 600
 FEWEST_SAMPLES = 3  # in the longest stretch, for an Allan deviation
@@ -44,27 +43,6 @@ class Series:
     low_pass: LowPass
 
 
-@dataclass(frozen=True)
-class Columns(Sequence[np.ndarray]):
-    """The values of some series, each read from its file when it is asked for.  where : samples to take; None: all"""
-
-    series: list[Series]
-    where: np.ndarray | None = None
-
-    def __len__(self) -> int:
-        return len(self.series)
-
-    @overload
-    def __getitem__(self, index: int) -> np.ndarray: ...
-    @overload
-    def __getitem__(self, index: slice) -> Columns: ...
-    def __getitem__(self, index: int | slice) -> np.ndarray | Columns:
-        if isinstance(index, slice):
-            return Columns(self.series[index], self.where)
-        values = read_column(self.series[index].path, self.series[index].column)
-        return values if self.where is None else values[self.where]
-
-
 def main(task: Task) -> None:
     """inputs : rates, fused, methods;  outputs : allan, spectrum, metrics, correlation
 
@@ -76,6 +54,7 @@ def main(task: Task) -> None:
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(axis)]
     series = [Series(rates, gyro, gyro, "", LowPass()) for gyro in gyros]
     series += fused_series(task.input("fused"), read_columns(task.input("methods")))
+    places = [(one.path, one.column) for one in series]
     frame = read_array(rates, [], axis)
     curves: dict[str, AllanCurve] = {}
     spectra: dict[str, Spectrum] = {}
@@ -84,21 +63,20 @@ def main(task: Task) -> None:
     rest = frame.rest_segment()
     poses = stretches(rest)
     if max((stop - start for start, stop in poses), default=0) >= FEWEST_SAMPLES:
-        values = Columns(series, None if frame.at_rest.all() else frame.at_rest)
         found = static_figures(
-            values, frame.rate_hz, rest, len(gyros), [one.low_pass for one in series], options, engine,
-            task.options["kind"] == "free" and len(poses) > 1,
+            FileColumns(places, frame.at_rest), frame.rate_hz, rest, len(gyros), [one.low_pass for one in series],
+            options, engine, task.options["kind"] == "free" and len(poses) > 1,
         )  # fmt: skip
         names = [one.column for one in series]
         curves, spectra = dict(zip(names, found.curves, strict=True)), dict(zip(names, found.spectra, strict=True))
         readings = found.readings
     reference = frame.reference
     if reference is not None:
-        moving = dynamic_figures(Columns(series), reference, frame.rate_hz, frame.segment, len(gyros), options)
+        moving = dynamic_figures(FileColumns(places), reference, frame.rate_hz, frame.segment, len(gyros), options)
         readings = [{**still, **row} for still, row in zip(readings, moving, strict=True)]
     made = task.provenance()
     write_tables(task, made, series, curves, spectra, readings)
-    correlation = noise_correlation(read_array(rates, gyros, axis), rest, reference, options)
+    correlation = noise_correlation(places[: len(gyros)], frame, rest, reference, options)
     write_table(
         task.output("correlation"), correlation_columns(gyros, correlation), "correlation", made,
         {"of": "samples at rest" if resting else "rate - reference"},
@@ -120,19 +98,20 @@ def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]
 
 
 def noise_correlation(
-    array: ArrayFile, rest: np.ndarray, reference: np.ndarray | None, options: MetricsOptions
+    gyros: list[tuple[Path, str]],
+    frame: ArrayFile,
+    rest: np.ndarray,
+    reference: np.ndarray | None,
+    options: MetricsOptions,
 ) -> Correlation:
     """Correlation of the noise at rest; of the errors where the board moves and the true rate is known; else NaN."""
-    number = array.rate.shape[1]
     if rest.size:
-        return correlation_matrix(chosen_rows(array.rate, array.at_rest), array.rate_hz, rest, options.confidence)
-    known = np.isfinite(reference) if reference is not None else np.zeros(0, bool)
-    if reference is not None and known.sum() > number:
-        moving = chosen_rows(array.rate, known)
-        return correlation_matrix(
-            moving, array.rate_hz, array.segment[known], options.confidence, truth=reference[known]
-        )
-    unknown = np.full((number, number), math.nan)
+        return correlation_matrix(FileColumns(gyros, frame.at_rest), frame.rate_hz, rest, options.confidence)
+    if reference is not None and np.isfinite(reference).sum() > len(gyros):
+        known = np.isfinite(reference)
+        moving, segment = FileColumns(gyros, known), frame.segment[known]
+        return correlation_matrix(moving, frame.rate_hz, segment, options.confidence, reference[known])
+    unknown = np.full((len(gyros), len(gyros)), math.nan)
     return Correlation(unknown, unknown, unknown, unknown)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,7 @@ from vgyro.metrics import (
 )
 from vgyro.storage.tables import write_json
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.rates_file import ArrayFile, chosen_rows, read_array
+from vgyro.tasks.rates_file import ArrayFile, FileColumns, read_array
 
 ENOUGH_REST_S = 10.0
 LONG_ENOUGH = 30  # samples
@@ -49,8 +50,11 @@ def main(task: Task) -> None:
     engine = task.options["analysis"].get("engine", "native")
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     path = task.inputs["rates"][0]
-    array = read_array(path, gyros, task.options["axis"])
-    found = noise_at_rest(array, options, engine) if rests_enough(array) else noise_in_motion(array, engine)
+    frame = read_array(path, [], task.options["axis"])
+    if rests_enough(frame):
+        found = noise_at_rest(FileColumns([(path, gyro) for gyro in gyros], frame.at_rest), frame, options, engine)
+    else:
+        found = noise_in_motion(read_array(path, gyros, task.options["axis"]), engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
 
 
@@ -60,19 +64,20 @@ def rests_enough(array: ArrayFile) -> bool:
     return sum(lengths) >= ENOUGH_REST_S * array.rate_hz and max(lengths) >= LONG_ENOUGH
 
 
-def noise_at_rest(array: ArrayFile, options: MetricsOptions, engine: str) -> ArrayNoiseRecord:
-    """From the samples at rest; no difference is taken across their gaps."""
-    segment = array.rest_segment()
-    rate = chosen_rows(array.rate, array.at_rest)
+def noise_at_rest(
+    series: Sequence[np.ndarray], frame: ArrayFile, options: MetricsOptions, engine: str
+) -> ArrayNoiseRecord:
+    """From the samples at rest, the only ones of `series`; no difference is taken across their gaps."""
+    segment = frame.rest_segment()
     fits, read = [], []
-    for column in rate.T:
+    for rate in series:
         curve = allan_deviation(
-            column, array.rate_hz, None, segment, options.confidence, engine, per_octave=options.taus_per_octave
+            rate, frame.rate_hz, None, segment, options.confidence, engine, per_octave=options.taus_per_octave
         )
         fits.append(noise_coefficients(curve, replicates=options.bootstrap, seed=options.seed))
         read.append(read_curve(curve, 1.0)[0])
-    correlation = correlation_matrix(rate, array.rate_hz, segment, options.confidence).value
-    return ArrayNoiseRecord("samples at rest", len(rate) / array.rate_hz, fits, read, correlation)
+    correlation = correlation_matrix(series, frame.rate_hz, segment, options.confidence).value
+    return ArrayNoiseRecord("samples at rest", len(segment) / frame.rate_hz, fits, read, correlation)
 
 
 def noise_in_motion(array: ArrayFile, engine: str) -> ArrayNoiseRecord:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -79,6 +81,25 @@ def read_column(path: Path, name: str) -> np.ndarray:
     return values
 
 
-def chosen_rows(rate: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The rows of rate [T, N] where chosen [T] is true, each column contiguous; not copied if all are."""
-    return rate if chosen.all() else np.stack([column[chosen] for column in rate.T]).T
+@dataclass(frozen=True)
+class FileColumns(Sequence[np.ndarray]):
+    """Columns of numbers of tables, each read when it is asked for.
+
+    places : file and name of each;  where : [T] samples to take, None: all
+    """
+
+    places: Sequence[tuple[Path, str]]
+    where: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @overload
+    def __getitem__(self, index: int) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, index: slice) -> FileColumns: ...
+    def __getitem__(self, index: int | slice) -> np.ndarray | FileColumns:
+        if isinstance(index, slice):
+            return FileColumns(self.places[index], self.where)
+        values = read_column(*self.places[index])
+        return values if self.where is None or self.where.all() else values[self.where]
