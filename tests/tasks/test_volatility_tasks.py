@@ -47,7 +47,7 @@ def write_series(folder, values, segment=None, rest=None, definition="level", ki
         "axis": "z",
         "definition": definition,
         "kind": kind,
-        "analysis": {"engine": "reference", "volatility": {"window": WINDOW, "step": STEP, **analysis}},
+        "analysis": {"engine": "native", "volatility": {"window": WINDOW, "step": STEP, **analysis}},
     }
     made = Task({"rates": [folder / "rates.parquet"]}, {"series": folder / "series.parquet"}, options, "code")
     series.main(made)
@@ -114,7 +114,7 @@ def test_parameters_are_those_of_the_window(tables):
     # Expected: the public function on the window cut out by hand.
     _, found = tables
     window = noise(300, 3)[50:170]
-    fit = fit_garch(window - window.mean(axis=0), "reference")
+    fit = fit_garch(window - window.mean(axis=0))
     rows = found["garch"]["window"] == 1
     np.testing.assert_allclose(found["garch"]["log_likelihood"][rows], fit.log_likelihood, rtol=1e-9)
     # The rounding of a block mean moves an ω near 0 along a flat likelihood; the variance is 0.0016.
