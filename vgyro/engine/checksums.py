@@ -6,9 +6,12 @@ place. With one table of 256 a place, the loop over the bytes has no step that w
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from vgyro.board import Checksum
+if TYPE_CHECKING:
+    from vgyro.board import Checksum
 
 WIDTHS = {8: np.uint8, 16: np.uint16, 32: np.uint32}
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vgyro.board import BinaryFrame, ByteOrder, FieldType
+if TYPE_CHECKING:
+    # For the checker alone: the models of boards take longer to load than the engine.
+    from vgyro.board import BinaryFrame, ByteOrder, FieldType
 
 # NumPy has no 24-bit integers; they are kept as 32-bit ones.
 DTYPES: dict[FieldType, str] = {
@@ -31,6 +33,11 @@ class Column(NamedTuple):
     kind: FieldType
     at: int
     order: ByteOrder
+
+    @property
+    def size(self) -> int:
+        """Bytes in the frame."""
+        return int(self.kind[1:]) // 8
 
 
 class Run(NamedTuple):
