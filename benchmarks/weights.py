@@ -44,14 +44,15 @@ def contests(quick: bool) -> list[Contest]:
         for name, (solve, _) in solvers.items():
             distance = float(np.max(np.abs(solve(parts[name]) - w[: len(parts[name])])))
             limit = WEIGHT_TOLERANCE if name == "quadprog" else None
-            figures.append(Accuracy(f"weights, largest |difference| to {name}", distance, limit))
+            figures.append(Accuracy(f"weights, largest difference to {name}", distance, limit))
         return figures
 
     limit = arithmetic(FLOPS, DIVISIONS, 8 * (GYROS * GYROS + GYROS))
     return [
         Contest(
             "weights", "QP, n = 6, warm", "QP", Side("vgyro", lambda: native.min_variance_weights(H), count), rivals,
-            limit, accuracy, "the libraries are called one problem at a time, as their interfaces want it",
+            limit, accuracy,
+            "the libraries get one problem at a time, as their interfaces want it; daqp and cvxpy are warm-started",
         )
     ]  # fmt: skip
 
