@@ -14,6 +14,7 @@ QUIET_QUANTILE = 0.1
 MOVING_SHARE = 4  # motion about one axis of three moves a third of the gyros: a quarter of them must see it
 SMOOTH = 3.0  # a spread so many times that of adjacent samples is motion, not noise
 FEWEST_SAMPLES = 4
+WINDOWS_AT_ONCE = 1 << 12
 
 
 def find_rest(
@@ -49,22 +50,19 @@ def find_rest(
         return np.zeros(samples, dtype=bool)
     needed = math.ceil(len(scores) / MOVING_SHARE)
     score = np.sort(np.stack(scores), axis=0)[-needed]
-    covered = np.zeros(samples + 1, dtype=np.int64)
+    covered = np.zeros(samples + 1, dtype=np.int32)
     resting = starts[score < options.threshold]
     np.add.at(covered, resting, 1)
     np.add.at(covered, resting + length, -1)
-    still = np.cumsum(covered)[:-1] > 0
+    still = np.cumsum(covered, out=covered)[:-1] > 0
     return _long_stretches(still, borders, round(options.guard_s * rate_hz), round(options.min_duration_s * rate_hz))
 
 
 def _scores(rate: np.ndarray, starts: np.ndarray, length: int) -> np.ndarray | None:
     """How far each window is from rest, in quiet levels; None for a gyro that never changes."""
-    centred = rate.astype(float) - float(np.median(rate))
-    sums, squares = (np.concatenate(([0.0], np.cumsum(values))) for values in (centred, centred**2))
-    steps = np.concatenate(([0.0, 0.0], np.cumsum(np.diff(centred) ** 2)))
-    mean = (sums[starts + length] - sums[starts]) / length
-    spread = np.sqrt(np.maximum((squares[starts + length] - squares[starts]) / length - mean**2, 0))
-    roughness = np.sqrt(np.maximum(steps[starts + length] - steps[starts + 1], 0) / (2 * (length - 1)))
+    middle = float(np.median(rate))
+    pieces = np.array_split(starts, math.ceil(len(starts) / WINDOWS_AT_ONCE))
+    mean, spread, roughness = np.concatenate([_moments(rate, middle, piece, length) for piece in pieces], axis=1)
     if not spread.any():
         return None
     quiet = float(np.quantile(spread[spread > 0], QUIET_QUANTILE))
@@ -75,9 +73,21 @@ def _scores(rate: np.ndarray, starts: np.ndarray, length: int) -> np.ndarray | N
     return np.maximum(spread, np.abs(mean - level)) / quiet
 
 
+def _moments(rate: np.ndarray, middle: float, starts: np.ndarray, length: int) -> np.ndarray:
+    """Mean (less `middle`), standard deviation and that of adjacent samples, of each window: [3, n]."""
+    first = int(starts[0])
+    centred = rate[first : int(starts[-1]) + length].astype(float) - middle
+    starts = starts - first
+    sums, squares = (np.concatenate(([0.0], np.cumsum(values))) for values in (centred, centred**2))
+    steps = np.concatenate(([0.0, 0.0], np.cumsum(np.diff(centred) ** 2)))
+    mean = (sums[starts + length] - sums[starts]) / length
+    spread = np.sqrt(np.maximum((squares[starts + length] - squares[starts]) / length - mean**2, 0))
+    roughness = np.sqrt(np.maximum(steps[starts + length] - steps[starts + 1], 0) / (2 * (length - 1)))
+    return np.stack([mean, spread, roughness])
+
+
 def _long_stretches(still: np.ndarray, borders: list[int], guard: int, shortest: int) -> np.ndarray:
-    edge = np.diff(still.astype(np.int8), prepend=0)
-    change = edge != 0
+    change = np.diff(still, prepend=False)
     change[[border for border in borders if border < len(still)]] = True
     points = [*np.flatnonzero(change).tolist(), len(still)]
     kept = np.zeros(len(still), dtype=bool)

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from vgyro.board import BinaryFrame, Board
 from vgyro.config import IntegrityOptions
 from vgyro.storage.clock import LOST, PAUSE, Clock, Timed
 from vgyro.storage.frames import Frames, channel_watches
 from vgyro.storage.inputs import BOARDS
-from vgyro.storage.integrity import Damage, FileRecord, Gap, Integrity, Ledger
+from vgyro.storage.integrity import FileRecord, Gap, Integrity, Ledger
 from vgyro.storage.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Found, Tail
 from vgyro.storage.sniff import Probe, boards_that_fit, probe, scanner_of
 from vgyro.storage.sources import Sources, open_sources
@@ -20,6 +22,8 @@ from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
 
 CHUNK_BYTES = 1 << 22
 BOOT_BYTES = 4096  # an acknowledgement or boot text of so many bytes is not held against a recording
+
+LARGEST_FREED = 31 << 20
 
 LEADING = "leading bytes"
 SEEN = ("checksum", "marked invalid by the board", "truncated at the end")
@@ -51,6 +55,8 @@ class DumpReader:
 
     def __iter__(self) -> Iterator[Frames]:
         """Decode chunk by chunk.  raises : Refused"""
+        # Once glibc has seen so large an array go, it keeps freed memory for the next chunk instead of mapping it anew.
+        np.empty(LARGEST_FREED, dtype=np.uint8)
         seen = probe(self._sources, self.board)
         self._probe = seen
         scanner = scanner_of(self.board, seen.typical_length, self.engine)
@@ -78,66 +84,58 @@ class DumpReader:
 
     def _note(self, found: Found, timed: Timed) -> None:
         """Damaged bytes before each frame, and gaps in time."""
-        rows = timed.rows
-        jumps = {jump.row if rows is None else int(rows[jump.row]): jump for jump in timed.jumps}
-        ends = found.stop[found.breaks - 1]
+        borders = self._sources.borders()
+        jumps = {jump.row if timed.rows is None else int(timed.rows[jump.row]): jump for jump in timed.jumps}
+        ends, starts = found.stop[found.breaks - 1], found.start[found.breaks]
         ends[0] = self._stop
-        starts = found.start[found.breaks]
-        before = dict(zip(found.breaks[starts > ends].tolist(), ends[starts > ends].tolist(), strict=True))
-        for row in sorted({*before, *jumps}):
-            stop = int(found.start[row])
-            start = before.get(row, stop)
-            jump = jumps.get(row)
-            lost = (jump.lost or 0) if jump else 0
+        holes = dict(zip(found.breaks[starts > ends].tolist(), ends[starts > ends].tolist(), strict=True))
+        rows = sorted({*holes, *jumps})
+        for row, stop, damage in zip(rows, found.start[rows].tolist(), found.damage[rows].tolist(), strict=True):
+            start, jump = holes.get(row, stop), jumps.get(row)
             if stop > start:
-                first = self._time is None and row == 0
-                self._note_damage(start, stop, lost, self._cause(start, stop, int(found.damage[row])), estimate=first)
+                lost = (jump.lost or 0) if jump else 0
+                cause = self._cause(start, stop, damage, borders)
+                self._note_damage(start, stop, lost, cause, borders, estimate=self._time is None and row == 0)
             if jump:
-                last = float(timed.time[jump.row - 1]) if jump.row else self._time or 0.0
+                last = timed.time.item(jump.row - 1) if jump.row else self._time or 0.0
                 due = last + 1 / self.rate_hz
-                duration = float(timed.time[jump.row]) - due if jump.known else None
-                cause = self._gap_cause(jump.kind, start, stop)
-                self._ledger.add_gap(Gap(due, duration, jump.lost, cause, jump.ambiguous))
+                duration = timed.time.item(jump.row) - due if jump.known else None
+                cause = _gap_cause(jump.kind, start, stop, borders)
+                self._ledger.add_gap(due, duration, jump.lost, cause, jump.ambiguous)
         self._stop = int(found.stop[-1])
 
     def _note_tail(self, tail: Tail) -> None:
         if tail.stop > tail.start:
-            cause = self._cause(tail.start, tail.stop, tail.damage)
+            borders = self._sources.borders()
+            cause = self._cause(tail.start, tail.stop, tail.damage, borders)
             if tail.broken_off and tail.stop - tail.start < 2 * self._length:
                 cause = "truncated at the end"
-            self._note_damage(tail.start, tail.stop, 0, cause, estimate=True)
+            self._note_damage(tail.start, tail.stop, 0, cause, borders, estimate=True)
 
-    def _note_damage(self, start: int, stop: int, lost: int, cause: str, estimate: bool) -> None:
+    def _note_damage(self, start: int, stop: int, lost: int, cause: str, borders: list[int], estimate: bool) -> None:
         """Write damaged bytes down, a file at a time; the frames are lost in the file that holds most of the bytes."""
         frames = max(int(cause in SEEN), round((stop - start) / self._length))
         if cause != LEADING or stop - start > BOOT_BYTES:
             self._ledger.bad += frames
         if estimate:
             lost = frames if cause in SEEN else 0
-        borders = [start, *(place for place in self._sources.borders() if start < place < stop), stop]
-        parts = list(pairwise(borders))
-        largest = max(parts, key=lambda part: part[1] - part[0])
-        for part in parts:
-            file, first = self._sources.place(part[0])
-            share = lost if part == largest else 0
-            self._ledger.add_damage(Damage(file.name, first, first + part[1] - part[0], share, cause))
+        if not borders:
+            self._ledger.add_damage(self._sources.files[0].name, start, stop, lost, cause)
+            return
+        places = [start, *(place for place in borders if start < place < stop), stop]
+        largest = max(map(int.__sub__, places[1:], places))
+        for first, last in pairwise(places):
+            file, place = self._sources.place(first)
+            share, lost = (lost, 0) if last - first == largest else (0, lost)
+            self._ledger.add_damage(file.name, place, place + last - first, share, cause)
 
-    def _cause(self, start: int, stop: int, damage: int) -> str:
-        begins = start in (0, *self._sources.borders())
+    def _cause(self, start: int, stop: int, damage: int, borders: list[int]) -> str:
+        begins = start == 0 or start in borders
         # A line of text has no fixed length: one that lost its beginning may be longer than the usual one.
         shortest = self._length if isinstance(self.board.layout, BinaryFrame) else 2 * self._length
         if begins and (damage == NO_SYNC or stop - start < shortest):
             return LEADING
         return CAUSES[damage]
-
-    def _gap_cause(self, kind: str, start: int, stop: int) -> str:
-        if kind == PAUSE:
-            return "the counter is in step, the clock is not: the board paused"
-        if kind != LOST:
-            return "the counter or clock restarted"
-        if any(start <= border <= stop for border in self._sources.borders()):
-            return "between two files"
-        return "damaged bytes" if stop > start else "not in the dump"
 
     def _conclude(self) -> None:
         where = str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more"
@@ -181,6 +179,16 @@ class DumpReader:
         if hints:
             return hints[-1]
         return "check that `board` and its frame layout are right, and that the logger stored raw bytes"
+
+
+def _gap_cause(kind: str, start: int, stop: int, borders: list[int]) -> str:
+    if kind == PAUSE:
+        return "the counter is in step, the clock is not: the board paused"
+    if kind != LOST:
+        return "the counter or clock restarted"
+    if any(start <= border <= stop for border in borders):
+        return "between two files"
+    return "damaged bytes" if stop > start else "not in the dump"
 
 
 def _frames_lost(gap: Gap) -> int:

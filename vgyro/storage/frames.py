@@ -41,12 +41,15 @@ class Reader(Protocol):
 def gather(reader: Reader, board: Board) -> Frames:
     """All chunks of a reader as one."""
     chunks = list(reader) or [empty_frames(board)]
-    counts = {name: np.concatenate([chunk.counts[name] for chunk in chunks]) for name in chunks[0].counts}
+
+    def whole(parts: list[np.ndarray]) -> np.ndarray:
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
     return Frames(
-        counts,
-        np.concatenate([chunk.counter for chunk in chunks]),
-        np.concatenate([chunk.time for chunk in chunks]),
-        np.concatenate([chunk.segment for chunk in chunks]),
+        {name: whole([chunk.counts.pop(name) for chunk in chunks]) for name in list(chunks[0].counts)},
+        whole([chunk.counter for chunk in chunks]),
+        whole([chunk.time for chunk in chunks]),
+        whole([chunk.segment for chunk in chunks]),
     )
 
 

@@ -132,25 +132,27 @@ class Ledger:
     restarts: int = 0
     ambiguous: int = 0
 
-    def add_damage(self, entry: Damage) -> None:
-        """Note damaged bytes."""
+    def add_damage(self, file: str, start: int, stop: int, frames_lost: int, cause: str) -> None:
+        """Note damaged bytes; see Damage."""
         if len(self.damage) < MAX_ENTRIES:
-            self.damage.append(entry)
+            self.damage.append(Damage(file, start, stop, frames_lost, cause))
             return
         self.more_damage["entries"] += 1
-        self.more_damage["bytes"] += entry.stop - entry.start
-        self.more_damage["frames_lost"] += entry.frames_lost
+        self.more_damage["bytes"] += stop - start
+        self.more_damage["frames_lost"] += frames_lost
 
-    def add_gap(self, gap: Gap) -> None:
-        """Note a gap in time."""
-        self.lost += gap.frames_lost or 0
-        self.restarts += gap.frames_lost is None
-        self.ambiguous += gap.ambiguous
+    def add_gap(
+        self, time: float, duration: float | None, frames_lost: int | None, cause: str, ambiguous: bool = False
+    ) -> None:
+        """Note a gap in time; see Gap."""
+        self.lost += frames_lost or 0
+        self.restarts += frames_lost is None
+        self.ambiguous += ambiguous
         if len(self.gaps) < MAX_ENTRIES:
-            self.gaps.append(gap)
+            self.gaps.append(Gap(time, duration, frames_lost, cause, ambiguous))
             return
         self.more_gaps["entries"] += 1
-        self.more_gaps["frames_lost"] += gap.frames_lost or 0
+        self.more_gaps["frames_lost"] += frames_lost or 0
 
 
 @dataclass

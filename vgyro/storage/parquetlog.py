@@ -16,7 +16,7 @@ from vgyro.config import IntegrityOptions
 from vgyro.dataset import ParquetLog
 from vgyro.errors import DataError
 from vgyro.storage.frames import Frames, channel_watches
-from vgyro.storage.integrity import Damage, FileRecord, Gap, Integrity, Ledger
+from vgyro.storage.integrity import FileRecord, Integrity, Ledger
 from vgyro.storage.layout import kept_channels
 from vgyro.storage.sources import check_exists
 from vgyro.storage.tables import sha256_of_file
@@ -123,11 +123,10 @@ class LogReader:
                 continue
             last = float(time[index] - step[index]) if not backward[index] else float(time[index]) - period
             if backward[index]:
-                self._ledger.add_gap(Gap(last + period, None, None, "the time column goes back"))
+                self._ledger.add_gap(last + period, None, None, "the time column goes back")
             else:
-                self._ledger.add_gap(
-                    Gap(last + period, float(step[index]) - period, int(missing[index]), self._gap_cause())
-                )
+                lasted, lost = float(step[index]) - period, int(missing[index])
+                self._ledger.add_gap(last + period, lasted, lost, self._gap_cause())
         plain = ~begins
         self._in_step += int(plain.sum())
         self._in_step_s += float(step[plain].sum())
@@ -151,10 +150,8 @@ class LogReader:
         for run in np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1) if len(bad) else ():
             first = int(rows[run[0]]) - before
             self._ledger.bad += len(run)
-            entry = Damage(
-                path.name, first, first + len(run), len(run), "rows without a value (start and stop are rows)"
-            )
-            self._ledger.add_damage(entry)
+            cause = "rows without a value (start and stop are rows)"
+            self._ledger.add_damage(path.name, first, first + len(run), len(run), cause)
         return good
 
     def _times(

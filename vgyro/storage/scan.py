@@ -9,6 +9,7 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.board import BinaryFrame, Board
+from vgyro.engine.frames import Column
 from vgyro.storage.layout import columns_of, kept_channels
 from vgyro.storage.selection import STRAY_FRAMES, CounterRule, breaks_of, last_alone, select, strays
 
@@ -83,7 +84,7 @@ class Scanner(Protocol):
 
     typical_length: float
 
-    def feed(self, data: bytes, last: bool = False) -> Found:
+    def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
         """Take the next bytes; return the frames that are certain by now."""
 
     def tail(self) -> Tail:
@@ -119,21 +120,19 @@ class BinaryScanner:
         self._counter_column = columns_of(frame, [counter.field] if counter else [])
         self._stamp_column = columns_of(frame, [stamp.field] if stamp else [])
 
-    def feed(self, data: bytes, last: bool = False) -> Found:
+    def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
         """Take the next bytes; return the frames that are certain by now."""
-        fresh = np.frombuffer(data, dtype=np.uint8)
-        self._buffer = np.concatenate([self._buffer, fresh]) if len(self._buffer) else fresh
+        self._buffer = np.concatenate([self._buffer, np.frombuffer(data, dtype=np.uint8)])
         end = self._base + len(self._buffer)
         places, failed = self._finder.find(self._buffer)
         # What is still in the buffer is judged again, so only older failures are kept.
         known = self._failed[: np.searchsorted(self._failed, self._base)]
         self._failed = np.concatenate([known, self._base + failed])
-        start = self._base + places
-        settled, keep_from = self._settled(start, end, last)
-        found = self._emit(start, settled, last or settled == len(start))
+        settled, keep_from = self._settled(places, end - self._base, last)
+        found = self._emit(places, settled, last or settled == len(places))
         if last:
             self._tail = self._rest(end)
-        self._keep(keep_from)
+        self._keep(self._base + keep_from)
         return found
 
     def tail(self) -> Tail:
@@ -147,62 +146,64 @@ class BinaryScanner:
         broken_off = any(sync.startswith(rest[place : place + len(sync)]) for place in range(len(rest)))
         return Tail(self._done, end, damage, broken_off)
 
-    def _settled(self, start: np.ndarray, end: int, last: bool) -> tuple[int, int]:
-        """How many candidates can be decided now, and the stream offset that must be kept for the rest.
+    def _settled(self, places: np.ndarray, end: int, last: bool) -> tuple[int, int]:
+        """How many candidates can be decided now, and the place in the buffer that must be kept for the rest.
 
         The cut is just before a candidate that overlaps nothing, also nothing that may still come: every choice
         takes it, so what lies before it can be decided without what lies behind.
         """
         length = self._length
         if last:
-            return len(start), end
+            return len(places), end
         waiting = end - length + 1
-        if not len(start):
+        if not len(places):
             return 0, waiting
-        if start[-1] + (STRAY_FRAMES + 2) * length < end or len(self._buffer) > MAX_HELD:
-            return len(start), max(waiting, int(start[-1]) + length)
-        certain = last_alone(start, length, end - 2 * length + 1)
+        if places[-1] + (STRAY_FRAMES + 2) * length < end or end > MAX_HELD:
+            return len(places), max(waiting, int(places[-1]) + length)
+        certain = last_alone(places, length, end - 2 * length + 1)
         if certain is None:
-            return 0, min(waiting, int(start[0]))
-        return certain, int(start[certain])
+            return 0, min(waiting, int(places[0]))
+        return certain, int(places[certain])
 
-    def _emit(self, start: np.ndarray, settled: int, final: bool) -> Found:
+    def _emit(self, places: np.ndarray, settled: int, final: bool) -> Found:
         """The first `settled` candidates without those that overlap better ones and those that are there by chance."""
-        counter, rule = self._read(start, self._counter_column), self._rule
-        step, modulus = (rule.step, rule.modulus) if rule else (0, 0)
-        breaks = self._kernels.breaks(start, self._length, counter, step, modulus)
-        following = settled < len(start) and not final
-        apart = start[breaks[1:]] - start[breaks[1:] - 1]
+        counter, rule = self._read(places, self._counter_column), self._rule
+        breaks = self._breaks(places, counter)
+        following = settled < len(places) and not final
+        apart = places[breaks[1:]] - places[breaks[1:] - 1]
         if np.any(apart < self._length):
-            chosen = select(start, self._length, counter, rule)[:settled]
+            chosen = select(places, self._length, counter, rule)[:settled]
             index = np.flatnonzero(np.append(chosen, True) if following else chosen)
-            start, counter = start[index], None if counter is None else counter[index]
-            breaks = self._kernels.breaks(start, self._length, counter, step, modulus)
+            places, counter = places[index], None if counter is None else counter[index]
+            breaks = self._breaks(places, counter)
         else:
-            seen = settled + following
-            start, counter = start[:seen], None if counter is None else counter[:seen]
-            breaks = breaks[: np.searchsorted(breaks, seen)]
-        stray = self._strays(start, counter, breaks)
+            places, counter, breaks = _head(settled + following, places, counter, breaks)
+        stray = self._strays(places, counter, breaks)
         if following:
-            start, counter = start[:-1], None if counter is None else counter[:-1]
-            stray, breaks = stray[stray < len(start)], breaks[: np.searchsorted(breaks, len(start))]
-        if len(start):
-            self._previous = int(start[-1]), 0 if counter is None else int(counter[-1])
+            stray = stray[stray < len(places) - 1]
+            places, counter, breaks = _head(len(places) - 1, places, counter, breaks)
+        if len(places):
+            self._previous = self._base + int(places[-1]), 0 if counter is None else int(counter[-1])
         if len(stray):
-            self._failed = np.union1d(self._failed, start[stray])
-            start, counter = np.delete(start, stray), None if counter is None else np.delete(counter, stray)
-            breaks = self._kernels.breaks(start, self._length, counter, step, modulus)
-        return self._found(start, counter, breaks)
+            self._failed = np.union1d(self._failed, self._base + places[stray])
+            places, counter = np.delete(places, stray), None if counter is None else np.delete(counter, stray)
+            breaks = self._breaks(places, counter)
+        return self._found(places, counter, breaks)
 
-    def _strays(self, start: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> np.ndarray:
+    def _breaks(self, places: np.ndarray, counter: np.ndarray | None) -> np.ndarray:
+        step, modulus = (self._rule.step, self._rule.modulus) if self._rule else (0, 0)
+        return self._kernels.breaks(places, self._length, counter, step, modulus)
+
+    def _strays(self, places: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> np.ndarray:
         """Rows that are frames by chance; only beside a break can one be."""
-        if counter is None or self._rule is None or not len(start):
+        if counter is None or self._rule is None or not len(places):
             return np.empty(0, dtype=np.int64)
-        rows = np.unique(np.concatenate([breaks, breaks[1:] - 1]))
-        return strays(start, self._length, counter, self._rule, rows, self._previous)
+        rows = np.concatenate([breaks, breaks[1:] - 1])
+        previous = None if self._previous is None else (self._previous[0] - self._base, self._previous[1])
+        return strays(places, self._length, counter, self._rule, rows, previous)
 
-    def _found(self, start: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> Found:
-        stop = start + self._length
+    def _found(self, places: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> Found:
+        start, stop = places + self._base, places + (self._base + self._length)
         damage = np.zeros(len(start), dtype=np.uint8)
         if len(start):
             before = stop[breaks - 1]
@@ -210,7 +211,6 @@ class BinaryScanner:
             failures = np.searchsorted(self._failed, start[breaks]) - np.searchsorted(self._failed, before)
             damage[breaks[failures > 0]] = BAD_CHECKSUM
             self._done = int(stop[-1])
-        places = start - self._base
         channels = self._kernels.read_columns(self._buffer, places, self._length, self._columns)
         return Found(
             start,
@@ -218,16 +218,16 @@ class BinaryScanner:
             damage,
             Content(self._buffer, places, self._length),
             counter,
-            self._read(start, self._stamp_column),
+            self._read(places, self._stamp_column),
             dict(zip(self._kept, channels, strict=True)),
             breaks,
         )
 
-    def _read(self, start: np.ndarray, columns: list) -> np.ndarray | None:
+    def _read(self, places: np.ndarray, columns: list[Column]) -> np.ndarray | None:
         """Counter or time stamp of frames, int64 [n]; None for a board without."""
         if not columns:
             return None
-        (values,) = self._kernels.read_columns(self._buffer, start - self._base, self._length, columns)
+        (values,) = self._kernels.read_columns(self._buffer, places, self._length, columns)
         return values.astype(np.int64)
 
     def _keep(self, keep_from: int) -> None:
@@ -238,3 +238,10 @@ class BinaryScanner:
         failed = self._failed[np.searchsorted(self._failed, self._done) :]
         gone = int(np.searchsorted(failed, keep_from))
         self._failed = failed[max(0, gone - 1) :]
+
+
+def _head(
+    count: int, places: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray
+) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+    """The first rows of all three."""
+    return places[:count], None if counter is None else counter[:count], breaks[: np.searchsorted(breaks, count)]

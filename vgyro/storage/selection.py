@@ -136,7 +136,7 @@ def strays(
     """Which of `rows` are candidates whose checksum holds by chance: they stand where their neighbours need another.
 
     start, counter : int64 [n], of chosen frames in order;  previous : start and counter of the frame before them
-    returns        : int64, rows in order; the first and the last frame are never strays, for lack of a neighbour
+    returns        : int64, as in `rows`; the first and the last frame are never strays, for lack of a neighbour
     Its neighbours agree with each other and with the bytes between them, and its counter is not between theirs.
     """
     rows = rows[(rows < len(start) - 1) & (rows >= (1 if previous is None else 0))]

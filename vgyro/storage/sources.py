@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -21,13 +22,14 @@ ZSTD_PIECE = 1 << 16
 
 @dataclass
 class SourceFile:
-    """One file: bytes on disk, SHA-256, compression, bytes of the dump in it, and whether it was cut short."""
+    """One file: bytes on disk, compression; when it is read, SHA-256, bytes of the dump in it, and whether it was cut
+    short."""
 
     path: Path
     name: str
     size: int
-    sha256: str
     compression: str
+    sha256: str = ""
     start: int = 0
     content_bytes: int = 0
     cut_short: bool = False
@@ -40,8 +42,8 @@ class Sources:
     files: list[SourceFile]
     _starts: list[int] = field(default_factory=list)
 
-    def chunks(self, size: int) -> Iterator[bytes]:
-        """All bytes, in order, at most `size` at a time."""
+    def chunks(self, size: int) -> Iterator[bytes | memoryview]:
+        """All bytes, in order, at most `size` at a time; a block is good until the next is asked for."""
         total = 0
         for file in self.files:
             file.start = total
@@ -50,6 +52,7 @@ class Sources:
                 total += len(block)
                 yield block
             file.content_bytes = total - file.start
+            file.sha256 = file.sha256 or sha256_of_file(file.path)
 
     def place(self, offset: int) -> tuple[SourceFile, int]:
         """The file that holds a byte of the stream, and the offset there; the end belongs to the last file."""
@@ -75,7 +78,7 @@ def open_sources(paths: Sequence[str | Path]) -> Sources:
             head = stream.read(4)
         if head == PARQUET:
             raise DataError("is a Parquet file, not a dump", str(path), "set `parquet:` for this recording")
-        files.append(SourceFile(path, path.name, size, sha256_of_file(path), _compression(head)))
+        files.append(SourceFile(path, path.name, size, _compression(head)))
     return Sources(files)
 
 
@@ -94,16 +97,26 @@ def check_exists(path: Path) -> None:
     raise DataError(f"no such file{near}", str(path), f"check `files` in the manifest; {listed}")
 
 
-def read_blocks(file: SourceFile, size: int) -> Iterator[bytes]:
-    """The dump's bytes, unpacked. A compressed file that breaks off gives what can be unpacked of it."""
+def read_blocks(file: SourceFile, size: int) -> Iterator[bytes | memoryview]:
+    """The dump's bytes, unpacked; a block is good until the next is asked for.
+
+    A compressed file that breaks off gives what can be unpacked of it.
+    """
     if file.compression == "gzip":
         yield from _gzip_blocks(file, size)
     elif file.compression == "zstd":
         yield from _zstd_blocks(file, size)
     else:
-        with open(file.path, "rb") as stream:
-            while block := stream.read(size):
-                yield block
+        yield from _plain_blocks(file, size)
+
+
+def _plain_blocks(file: SourceFile, size: int) -> Iterator[memoryview]:
+    digest, room = hashlib.sha256(), memoryview(bytearray(min(size, file.size)))
+    with open(file.path, "rb", buffering=0) as stream:
+        while count := stream.readinto(room):
+            digest.update(room[:count])
+            yield room[:count]
+    file.sha256 = digest.hexdigest()
 
 
 def _compression(head: bytes) -> str:

@@ -43,7 +43,7 @@ class TextScanner:
         self._types = channel_types(frame)
         self.typical_length = self.typical_length or float(len(frame.prefix) + 4 * len(self._types))
 
-    def feed(self, data: bytes, last: bool = False) -> Found:
+    def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
         """Take the next bytes; return the frames that are certain by now."""
         if self._fresh and self._frame.checksum.family == "none":
             # A line must begin after a line end; the stream's first line gets one, and is judged apart.

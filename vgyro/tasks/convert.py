@@ -12,11 +12,10 @@ from vgyro.board import Board
 from vgyro.calibration import clipped_samples, find_rest, fit_phase, sinusoid, to_rates
 from vgyro.config import RestOptions
 from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, Recording, SinusoidReference
-from vgyro.storage.tables import TableWriter, read_columns, read_json
+from vgyro.storage.tables import TableWriter, read_batches, read_json
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.reference_log import read_reference
 
-BATCH = 1 << 18
 MOSTLY_CLIPPED = 0.01
 CONTRADICTION = 0.02
 FEWEST_STEPS = 10
@@ -33,7 +32,7 @@ def main(task: Task) -> None:
     recording = manifest.recording(task.options["recording"])
     frames = task.input("frames")
     converter = Converter(board, recording, read_json(task.input("calibration"))["gyros"])
-    time = read_columns(frames, ["time"])["time"]
+    time = whole_column(frames, "time")
     rate_hz = sample_rate(recording, board, time)
     options = RestOptions.model_validate(task.options["analysis"].get("rest", {}))
     clipped = converter.clipped(frames)
@@ -54,9 +53,8 @@ def main(task: Task) -> None:
         extra["reference_axis"] = recording.axis or board.axes[0]
     with TableWriter(task.output("rates"), "rates", task.provenance(), extra) as writer:
         first = 0
-        for batch in pq.ParquetFile(frames).iter_batches(BATCH, columns=converter.columns):
-            rows = slice(first, first + batch.num_rows)
-            raw = {name: batch.column(name).to_numpy() for name in converter.columns}
+        for raw in read_batches(frames, converter.columns):
+            rows = slice(first, first + len(raw["time"]))
             known = {} if reference is None else {"reference": reference[rows]}
             head = {"time": raw["time"], "segment": raw["segment"], "at_rest": at_rest[rows]}
             writer.append({**head, **known, **converter.temperatures(raw), **converter.rates_of(raw)})
@@ -98,20 +96,36 @@ class Converter:
         if self.board.adc is None or self.rates:
             return {}
         rails = (self.board.adc.low, self.board.adc.high)
-        return {
-            gyro.name: clipped_samples(read_columns(frames, [gyro.field])[gyro.field], rails)
-            for gyro in self.board.gyros
-        }
+        return {gyro.name: clipped_samples(whole_column(frames, gyro.field), rails) for gyro in self.board.gyros}
 
     def array(self, frames: Path, names: list[str]) -> np.ndarray:
         """Rates [T, n] of some gyros, in single precision."""
-        raw = read_columns(frames, [*dict.fromkeys(gyro.field for gyro in self.board.gyros if gyro.name in names)])
         chosen = Converter(
             self.board.model_copy(update={"gyros": tuple(g for g in self.board.gyros if g.name in names)}),
             self.recording,
             self.gyros,
         )
-        return np.column_stack([rate.astype(np.float32) for rate in chosen.rates_of(raw).values()])
+        fields = [*dict.fromkeys(gyro.field for gyro in chosen.board.gyros)]
+        rates = np.empty((pq.read_metadata(frames).num_rows, len(chosen.board.gyros)), dtype=np.float32)
+        first = 0
+        for raw in read_batches(frames, fields):
+            stop = first + len(raw[fields[0]])
+            for index, rate in enumerate(chosen.rates_of(raw).values()):
+                rates[first:stop, index] = rate
+            first = stop
+        return rates
+
+
+def whole_column(frames: Path, name: str) -> np.ndarray:
+    """One column of numbers of a table, read row group by row group: little more memory than it takes itself."""
+    kind = pq.read_schema(frames).field(name).type.to_pandas_dtype()
+    values = np.empty(pq.read_metadata(frames).num_rows, dtype=kind)
+    first = 0
+    for batch in read_batches(frames, [name]):
+        stop = first + len(batch[name])
+        values[first:stop] = batch[name]
+        first = stop
+    return values
 
 
 def sample_rate(recording: Recording, board: Board, time: np.ndarray) -> float:
@@ -137,7 +151,7 @@ def rest_of(converter: Converter, frames: Path, time: np.ndarray, rate_hz: float
         return inside
     if recording.kind == "free" and time.size:
         rates = converter.array(frames, [gyro.name for gyro in converter.board.gyros])
-        return find_rest(rates, rate_hz, options, read_columns(frames, ["segment"])["segment"])
+        return find_rest(rates, rate_hz, options, whole_column(frames, "segment"))
     return np.full(time.size, recording.kind in AT_REST)
 
 

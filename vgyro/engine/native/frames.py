@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vgyro.board import TYPE_BYTES, BinaryFrame
 from vgyro.engine.checksums import crc_tables
 from vgyro.engine.frames import DTYPES, Candidates, Column, Run, fixed_bytes
 from vgyro.engine.native import _frames
+
+if TYPE_CHECKING:
+    from vgyro.board import BinaryFrame
 
 ROOM = 1 << 12
 """Candidates, beyond those of a dump of whole frames, for which there is room at first."""
@@ -22,7 +25,14 @@ class Finder:
     def __init__(self, frame: BinaryFrame) -> None:
         rule, fixed = frame.checksum, fixed_bytes(frame)
         first, last = rule.span or (0, 0)
-        zeros, tables = crc_tables(rule, last - first) if rule.family == "crc" else (0, np.zeros(1, dtype=np.uint8))
+        zeros, tables = 0, np.zeros((1, 256), dtype=np.uint8)
+        if rule.family == "crc":
+            zeros, tables = crc_tables(rule, last - first)
+            # The sync bytes are always the same: what they add is known before.
+            sync = bytes.fromhex(frame.sync)[first : last - 1]
+            for table, byte in zip(tables, sync, strict=False):
+                zeros ^= int(table[byte])
+            first, tables = first + len(sync), tables[len(sync) :]
         self._length = frame.length
         self._layout = _frames.Layout(
             frame.length,
@@ -54,15 +64,15 @@ class Finder:
 def read_columns(buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[Column]) -> list[np.ndarray]:
     """Values of channels of the frames of `length` bytes that begin at `places`, each [n], in the channel's own type.
 
-    buffer : uint8 [m];  places : int64 [n]
+    buffer : uint8 [m];  places : int64 [n], ascending
     """
     read = [np.empty(len(places), dtype=DTYPES[column.kind]) for column in columns]
     if not len(places):
         return read
-    if places.min() < 0 or places.max() + length > len(buffer):
+    if places[0] < 0 or places[-1] + length > len(buffer):
         raise IndexError(f"frames of {length} bytes do not lie in a buffer of {len(buffer)}")
     wanted = [
-        (column.at, TYPE_BYTES[column.kind], column.order == "big", column.kind[0] == "i", values.view(np.uint8))
+        (column.at, column.size, column.order == "big", column.kind[0] == "i", values.view(np.uint8))
         for column, values in zip(columns, read, strict=True)
     ]
     _frames.columns(buffer, places, wanted)

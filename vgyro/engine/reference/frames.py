@@ -41,7 +41,7 @@ class Finder:
 def read_columns(buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[Column]) -> list[np.ndarray]:
     """Values of channels of the frames of `length` bytes that begin at `places`, each [n], in the channel's own type.
 
-    buffer : uint8 [m];  places : int64 [n]
+    buffer : uint8 [m];  places : int64 [n], ascending
     """
     if not len(places):
         return [np.empty(0, dtype=DTYPES[column.kind]) for column in columns]

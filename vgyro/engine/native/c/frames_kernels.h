@@ -170,41 +170,60 @@ static size_t VG(frames_breaks)(const int64_t *start, const int64_t *counter, si
     return found;
 }
 
-/* Equal neighbours are rare in noise: blocks of comparisons are looked through eight at a time. */
 #define FRAMES_BLOCK 64
-#define FRAMES_RUN_OF(type)                                                                                          \
-    static double VG(frames_run_##type)(const type *values, const double *time, size_t count, double since,          \
-                                        double *began, double *duration) {                                           \
-        int running = 1; /* values[k - 1] is in a run that began at `since` */                                       \
-        if (time[0] - since > *duration) *began = since, *duration = time[0] - since;                                \
-        for (size_t block = 1; block < count; block += FRAMES_BLOCK) {                                               \
-            const size_t size = count - block < FRAMES_BLOCK ? count - block : FRAMES_BLOCK;                         \
-            uint8_t equal[FRAMES_BLOCK] = {0};                                                                       \
-            for (size_t k = 0; k < size; k++) equal[k] = values[block + k] == values[block + k - 1];                 \
-            for (size_t eight = 0; eight < size; eight += 8) {                                                       \
-                uint64_t any;                                                                                        \
-                memcpy(&any, equal + eight, sizeof any);                                                             \
-                if (!any) {                                                                                          \
-                    running = 0;                                                                                     \
-                    continue;                                                                                        \
-                }                                                                                                    \
-                for (size_t k = eight; k < eight + 8 && k < size; k++) {                                             \
-                    if (equal[k]) {                                                                                  \
-                        if (!running) since = time[block + k - 1];                                                   \
-                        const double lasted = time[block + k] - since;                                               \
-                        if (lasted > *duration) *began = since, *duration = lasted;                                  \
-                    }                                                                                                \
-                    running = equal[k];                                                                              \
-                }                                                                                                    \
-            }                                                                                                        \
-        }                                                                                                            \
-        return running ? since : time[count - 1];                                                                    \
+
+/* Four vectors of maxima that do not wait for each other. */
+VG_INLINE double VG(longest_step)(const double *time) {
+    v4 longest[4] = {v4_set(0.0), v4_set(0.0), v4_set(0.0), v4_set(0.0)}, later, earlier;
+    for (size_t k = 0; k < FRAMES_BLOCK; k += VG_LANES) {
+        memcpy(&later, time + k, sizeof later);
+        memcpy(&earlier, time + k - 1, sizeof earlier);
+        const size_t own = k / VG_LANES % 4;
+        longest[own] = v4_max(longest[own], later - earlier);
     }
-FRAMES_RUN_OF(int8_t)
-FRAMES_RUN_OF(int16_t)
-FRAMES_RUN_OF(int32_t)
-FRAMES_RUN_OF(int64_t)
-FRAMES_RUN_OF(float)
-FRAMES_RUN_OF(double)
+    const v4 all = v4_max(v4_max(longest[0], longest[1]), v4_max(longest[2], longest[3]));
+    const double even = all[0] > all[2] ? all[0] : all[2], odd = all[1] > all[3] ? all[1] : all[3];
+    return even > odd ? even : odd;
+}
+
+/* In noise equal neighbours are rare and three equal ones rarer: a block is looked at one by one only where a run in it
+   could be the longest. `running`: the sample before is in a run, which began at `since`. `mask` is as wide as `type`. */
+#define FRAMES_RUN_OF(type, mask)                                                                                \
+    static double VG(frames_run_##type)(const type *values, const double *time, size_t count, double since,      \
+                                        double *began, double *duration) {                                       \
+        int running = 1;                                                                                         \
+        if (time[0] - since > *duration) *began = since, *duration = time[0] - since;                            \
+        for (size_t block = 1; block < count; block += FRAMES_BLOCK) {                                           \
+            const type *here = values + block;                                                                   \
+            const size_t size = count - block < FRAMES_BLOCK ? count - block : FRAMES_BLOCK;                     \
+            if (size == FRAMES_BLOCK && block > 1) {                                                             \
+                mask two = 0, three = 0;                                                                         \
+                for (ptrdiff_t k = 0; k < FRAMES_BLOCK; k++) {                                                   \
+                    const mask same = here[k] == here[k - 1], before = here[k - 1] == here[k - 2];               \
+                    two |= same, three |= same & before;                                                         \
+                }                                                                                                \
+                if (!two || (!three && VG(longest_step)(time + block) <= *duration)) {                           \
+                    running = here[FRAMES_BLOCK - 1] == here[FRAMES_BLOCK - 2];                                  \
+                    if (running) since = time[block + FRAMES_BLOCK - 2];                                         \
+                    continue;                                                                                    \
+                }                                                                                                \
+            }                                                                                                    \
+            for (size_t k = block; k < block + size; k++) {                                                      \
+                const int same = values[k] == values[k - 1];                                                     \
+                if (same) {                                                                                      \
+                    if (!running) since = time[k - 1];                                                           \
+                    if (time[k] - since > *duration) *began = since, *duration = time[k] - since;                \
+                }                                                                                                \
+                running = same;                                                                                  \
+            }                                                                                                    \
+        }                                                                                                        \
+        return running ? since : time[count - 1];                                                                \
+    }
+FRAMES_RUN_OF(int8_t, int8_t)
+FRAMES_RUN_OF(int16_t, int16_t)
+FRAMES_RUN_OF(int32_t, int32_t)
+FRAMES_RUN_OF(int64_t, int64_t)
+FRAMES_RUN_OF(float, int32_t)
+FRAMES_RUN_OF(double, int64_t)
 #undef FRAMES_RUN_OF
 #undef FRAMES_BLOCK
