@@ -109,15 +109,17 @@ class TableWriter:
         counted = self._schema in COUNTED
         floats = [field.name for field in schema if pa.types.is_floating(field.type)]
         numbers = [name for name in floats if not counted or name == "time"]
-        split = numbers if self._compression != "none" else False
-        others = [field.name for field in schema if field.name not in numbers]
+        encoding = dict.fromkeys(numbers if self._compression != "none" else (), "BYTE_STREAM_SPLIT")
+        whole = [field.name for field in schema if counted and pa.types.is_integer(field.type)]
+        encoding.update(dict.fromkeys(whole, "DELTA_BINARY_PACKED"))
+        others = [field.name for field in schema if field.name not in (*numbers, *whole)]
         return pq.ParquetWriter(
             self._beside,
             described,
             compression=self._compression,
             version="2.6",
             use_dictionary=others,
-            use_byte_stream_split=split,
+            column_encoding=encoding or None,
         )
 
     def _metadata(self, names: list[str]) -> bytes:

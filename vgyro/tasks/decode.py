@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from vgyro.config import IntegrityOptions
 from vgyro.dataset import Manifest, Recording
 from vgyro.errors import DataError
 from vgyro.storage.decode import open_recording
-from vgyro.storage.frames import Frames, empty_frames
+from vgyro.storage.frames import Frames, Reader, empty_frames
 from vgyro.storage.integrity import Integrity, Refused
 from vgyro.storage.tables import Provenance, TableWriter, write_json, write_table
 from vgyro.storage.verdict import unreadable_record
@@ -21,7 +20,7 @@ from vgyro.tasks.common import Task, run_task
 
 
 def main(task: Task) -> None:
-    """inputs : files;  outputs : frames, integrity;  options : manifest, board, recording, analysis.integrity
+    """inputs : files;  outputs : frames, integrity;  options : manifest, board, recording, analysis.{integrity, engine}
 
     A refused recording gets an empty table, a record that says why, and one message on stderr; the other recordings
     go on, and the last rule of the workflow fails.
@@ -29,10 +28,14 @@ def main(task: Task) -> None:
     manifest = Manifest.model_validate(task.options["manifest"])
     board = Board.model_validate(task.options["board"])
     recording = manifest.recording(task.options["recording"])
-    options = IntegrityOptions.model_validate(task.options.get("analysis", {}).get("integrity", {}))
+    analysis = task.options.get("analysis", {})
+    options = IntegrityOptions.model_validate(analysis.get("integrity", {}))
     provenance = _provenance(task)
     try:
-        record = decode(task.inputs["files"], recording, board, options, task.output("frames"), provenance)
+        reader = open_recording(
+            task.inputs["files"], recording, board, options, engine=analysis.get("engine", "native")
+        )
+        record = decode(reader, task.output("frames"), provenance, _extra(board, recording))
         for reason in record.reasons:
             _say(f"{recording.name}: suspect: {reason}")
     except DataError as error:
@@ -45,17 +48,9 @@ def main(task: Task) -> None:
     write_json(task.output("integrity"), {"recording": recording.name, **record.to_json()})
 
 
-def decode(
-    paths: Iterable[Path],
-    recording: Recording,
-    board: Board,
-    options: IntegrityOptions,
-    output: Path,
-    provenance: Provenance,
-) -> Integrity:
+def decode(reader: Reader, output: Path, provenance: Provenance, extra: dict[str, str]) -> Integrity:
     """Stream a recording into a table of frames.  raises : DataError; then there is no table"""
-    reader = open_recording(list(paths), recording, board, options)
-    with TableWriter(output, "frames", provenance, _extra(board, recording)) as writer:
+    with TableWriter(output, "frames", provenance, extra) as writer:
         for frames in reader:
             writer.append(columns_of(frames))
     if reader.integrity is None:

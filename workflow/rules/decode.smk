@@ -14,7 +14,7 @@ rule decode:
         runtime=60,
     params:
         files=named_files,
-        options=stage("manifest", "board", "integrity"),
+        options=stage("manifest", "board", "integrity", "engine"),
         code=code("decode"),
     shell:
         "python -m vgyro.tasks.decode --input files {params.files:q} --output frames {output.frames}"
