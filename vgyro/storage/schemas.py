@@ -78,7 +78,7 @@ _ALL = (
         Column("se_alpha", "1", "robust standard error"),
         Column("se_beta", "1", "robust standard error"),
         Column("log_likelihood", "1", "Gaussian log-likelihood of the window"),
-        Column("status", "", "converged, boundary, no variance, too short, failed"),
+        Column("status", "", "converged, boundary: …, outlier-dominated, no variance, too short, failed"),
     )),
     Schema("dcc", 1, "DCC(1,1) and constant-correlation test of each window and the longest stretch (-1)", (
         *_WINDOW,
@@ -94,7 +94,7 @@ _ALL = (
         Column("statistic", "1", "constant-correlation test"),
         Column("p_value", "1", "its probability under chi²(s + 1)"),
         Column("p_value_s", "1", "its probability under chi²(s)"),
-        Column("status", "", "converged; boundary (margin), not positive definite, one gyro, too short, failed"),
+        Column("status", "", "converged, boundary: …, boundary margin, outlier-dominated, one gyro, …"),
     )),
     Schema("fits", 1, "how the fits of the rolling windows ended, over the recording", (
         Column("time_start", "s", "start of the bin; a window counts where its middle is"),
@@ -171,7 +171,7 @@ _ALL = (
         Column("difference", "see unit", "ours - theirs"),
         Column("tolerance", "see unit", "largest difference that passes"),
         Column("unit", "", "unit of the four figures"),
-        Column("passed", "", "true if |difference| <= tolerance"),
+        Column("passed", "", "true if |difference| <= tolerance; of two maxima, if difference >= -tolerance"),
     )),
     Schema("reference", 1, "logged true rate of a simulated recording", (
         _TIME,
