@@ -8,7 +8,7 @@ from vgyro import engine
 from vgyro.engine import ENGINES
 from vgyro.errors import EngineError, TooShort
 from vgyro.metrics import allan_deviation, averaging_factors, read_curve
-from vgyro.metrics.noise_type import exponent_by_autocorrelation, exponent_by_ratio, noise_exponents
+from vgyro.metrics.noise_type import block_means, exponent_by_autocorrelation, exponent_by_ratio, noise_exponents
 
 NBS14_PHASE = [0.0, 103.11111, 123.22222, 157.33333, 166.44444, 48.55555, -96.33333, -2.22222, 111.88889, 0.0]
 
@@ -166,17 +166,26 @@ def test_noise_type_of_white_noise_of_the_angle(name: str):
 
 def test_noise_type_of_few_blocks_by_the_variance_ratio():
     rng = np.random.default_rng(9)
-    white = [exponent_by_ratio([rng.standard_normal(20)]) for _ in range(200)]
-    walk = [exponent_by_ratio([np.cumsum(rng.standard_normal(20))]) for _ in range(200)]
+    white = [exponent_by_ratio(rng.standard_normal(20), np.array([20])) for _ in range(200)]
+    walk = [exponent_by_ratio(np.cumsum(rng.standard_normal(20)), np.array([20])) for _ in range(200)]
     assert np.mean(np.array(white) == 0) > 0.8
     assert np.mean(np.array(walk) < 0) > 0.9
     assert np.mean(np.array(walk) == -2) > 0.4
 
 
+def test_block_means_of_several_stretches():
+    rate = np.arange(30.0)
+    means = block_means(rate, np.array([0, 11, 20]), np.array([3, 2, 2]), 5)
+    np.testing.assert_array_equal(means, [2, 7, 12, 13, 18, 22, 27])
+    np.testing.assert_array_equal(block_means(rate[:9], np.array([0]), np.array([2]), 4), [1.5, 5.5])
+
+
 def test_noise_type_never_rises_with_tau():
     rng = np.random.default_rng(10)
     rate = rng.standard_normal(20_000) + np.cumsum(0.02 * rng.standard_normal(20_000))
-    exponents = noise_exponents([rate], averaging_factors(1.0, rate.size), engine.get("native").allan)
+    exponents = noise_exponents(
+        rate, np.array([0, rate.size]), averaging_factors(1.0, rate.size), engine.get("native").allan
+    )
     assert np.all(np.diff(exponents) <= 0)
     assert exponents[0] == 0
     assert exponents[-1] == -2

@@ -42,7 +42,7 @@ def allan_deviation(
 ) -> AllanCurve:
     """Overlapping Allan deviation, chi² limits and equivalent degrees of freedom.
 
-    rate       : array [T], deg/s, at a constant rate_hz within each segment; float32 is not copied
+    rate       : array [T], deg/s, at a constant rate_hz within each segment
     taus       : array, s, rounded to whole samples; None: `per_octave` a factor 2, from one sample to a third of the
                  longest segment, with τ = 1 s among them where that is a whole number of samples
     segment    : array [T] int, number of the gap-free stretch of each sample; None: there is no gap
@@ -53,23 +53,18 @@ def allan_deviation(
     raises     : TooShort if no segment has three samples
     Riley, NIST SP 1065, eq. 11 and 45; edf: Greenhall & Riley (2003), with the noise identified at each τ.
     """
-    pieces = split_segments(floating(rate), segment)
-    longest = max((piece.size for piece in pieces), default=0)
+    rate = np.asarray(rate, dtype=float)
+    edges = edges_of(len(rate), segment)
+    lengths, alike = np.unique(np.diff(edges), return_counts=True)
+    longest = int(lengths.max(initial=0))
     factors = averaging_factors(rate_hz, longest, taus, per_octave)
     if factors.size == 0:
         raise TooShort(
             f"the longest gap-free stretch has {longest} samples", remedy="An Allan deviation needs 3 samples in a row"
         )
     allan = engines.get(engine).allan
-    sums, counts = np.zeros(factors.size), np.zeros(factors.size)
-    for piece in pieces:
-        used = factors * LONGEST_TAU <= piece.size
-        if used.any():
-            piece_sums, piece_counts = allan.second_differences(piece, rate_hz, factors[used])
-            sums[used] += piece_sums
-            counts[used] += piece_counts
-    exponent = noise_exponents(pieces, factors, allan)
-    lengths, alike = np.unique([piece.size for piece in pieces], return_counts=True)
+    sums, counts = allan.second_differences(rate, rate_hz, factors, edges, LONGEST_TAU)
+    exponent = noise_exponents(rate, edges, factors, allan)
     edf = np.empty(factors.size)
     for row, (m, alpha) in enumerate(zip(factors.tolist(), exponent.tolist(), strict=True)):
         used = lengths >= LONGEST_TAU * m
@@ -93,23 +88,20 @@ def averaging_factors(
     return factors[(factors >= 1) & (factors <= longest)]
 
 
-def floating(values: np.ndarray) -> np.ndarray:
-    """Values as floating-point numbers, float32 as it is: all figures are summed in double precision."""
-    values = np.asarray(values)
-    return values if values.dtype == np.float32 else values.astype(float, copy=False)
-
-
-def split_segments(rate: np.ndarray, segment: np.ndarray | None) -> list[np.ndarray]:
-    """The gap-free stretches of `rate`: runs of equal `segment`."""
-    if segment is None:
-        return [rate] if len(rate) else []
-    return [rate[start:stop] for start, stop in stretches(segment)]
+def edges_of(samples: int, segment: np.ndarray | None) -> np.ndarray:
+    """First sample of each run of equal `segment` [T] (None: there is no gap), and T: [S + 1] int."""
+    inner = np.empty(0, np.int64) if segment is None else np.flatnonzero(segment[1:] != segment[:-1]) + 1
+    return np.concatenate([np.zeros(1, np.int64), inner, np.full(int(samples > 0), samples)])
 
 
 def stretches(segment: np.ndarray) -> list[tuple[int, int]]:
     """First sample, and one past the last, of each run of equal `segment` [T]."""
-    borders = [0, *(np.flatnonzero(segment[1:] != segment[:-1]) + 1).tolist(), len(segment)]
-    return list(itertools.pairwise(borders)) if len(segment) else []
+    return list(itertools.pairwise(edges_of(len(segment), segment).tolist()))
+
+
+def split_segments(rate: np.ndarray, segment: np.ndarray | None) -> list[np.ndarray]:
+    """The gap-free stretches of `rate`: runs of equal `segment`."""
+    return [rate[start:stop] for start, stop in itertools.pairwise(edges_of(len(rate), segment).tolist())]
 
 
 def read_curve(curve: AllanCurve, tau: float) -> tuple[float, float, float]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.metrics.allan import split_segments
+from vgyro.metrics.allan import edges_of
 
 LARGEST_LAG_SHARE = 4
 WINDOW_FACTOR = 5
@@ -75,11 +76,12 @@ class _Noise:
 
     def column(self, gyro: int) -> np.ndarray:
         """One gyro [T]."""
-        column = self.series[gyro].astype(float)
+        rate = np.asarray(self.series[gyro], dtype=float)
         if self.truth is not None:
-            column -= self.truth
-        for piece in split_segments(column, self.segment):
-            piece -= piece.mean()
+            rate = rate - self.truth
+        column = np.empty(len(rate))
+        for start, stop in itertools.pairwise(edges_of(len(rate), self.segment).tolist()):
+            np.subtract(rate[start:stop], rate[start:stop].mean(), out=column[start:stop])
         return column
 
 

@@ -13,10 +13,10 @@ LARGEST_RHO = 0.25
 STEPS = (0, -1, -2)
 
 
-def noise_exponents(pieces: list[np.ndarray], factors: np.ndarray, allan: ModuleType) -> np.ndarray:
+def noise_exponents(rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType) -> np.ndarray:
     """Exponent of the power spectrum at each averaging factor: 2 … -2, never rising with τ.
 
-    pieces  : gap-free stretches, arrays [T_s]
+    rate    : array [T];  edges : array [S + 1] int, first sample of each gap-free stretch, and T
     factors : array [M] int, ascending averaging factors;  allan : that module of an engine
     returns : array [M] int
     With 30 block means or more: lag-1 autocorrelation (Riley & Greenhall, "Power law noise identification using the
@@ -25,23 +25,19 @@ def noise_exponents(pieces: list[np.ndarray], factors: np.ndarray, allan: Module
     steeper one governs the longer τ, so the sequence is made monotone (isotonic regression, weight: block means):
     one chance result among many τ would else multiply its degrees of freedom by ten.
     """
-    raw, weight = np.zeros(len(factors)), np.zeros(len(factors))
-    squares, products = np.zeros((len(factors), MOST_DIFFERENCES + 1)), np.zeros((len(factors), MOST_DIFFERENCES + 1))
-    for piece in pieces:
-        long = piece.size // factors >= ENOUGH_FOR_AUTOCORRELATION
-        if long.any():
-            of_piece = allan.lag_products(piece, factors[long])
-            squares[long] += of_piece[0]
-            products[long] += of_piece[1]
-            weight[long] += piece.size // factors[long]
+    lengths = np.diff(edges)
+    raw, weight = np.zeros(len(factors)), np.ones(len(factors))
+    long = factors * ENOUGH_FOR_AUTOCORRELATION <= lengths.max()
+    squares, products = allan.lag_products(rate, factors[long], edges, ENOUGH_FOR_AUTOCORRELATION)
     for index, factor in enumerate(factors.tolist()):
-        if weight[index]:
+        means = lengths // factor
+        if long[index]:
             raw[index] = exponent_by_autocorrelation(squares[index], products[index])
-            continue
-        short = [block_means(piece, factor) for piece in pieces if piece.size >= ENOUGH_FOR_RATIO * factor]
-        weight[index] = max(sum(block.size for block in short), 1)
-        if short:
-            raw[index] = exponent_by_ratio(short)
+            weight[index] = means[means >= ENOUGH_FOR_AUTOCORRELATION].sum()
+        elif means.max() >= ENOUGH_FOR_RATIO:
+            used = means >= ENOUGH_FOR_RATIO
+            raw[index] = exponent_by_ratio(block_means(rate, edges[:-1][used], means[used], factor), means[used])
+            weight[index] = means[used].sum()
         elif index:
             raw[index] = raw[index - 1]
     return np.round(_falling(raw, weight)).astype(np.int64)
@@ -60,10 +56,14 @@ def _falling(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.concatenate([np.full(count, mean) for mean, _, count in pools])
 
 
-def block_means(series: np.ndarray, length: int) -> np.ndarray:
-    """Means of adjacent blocks of `length` samples; an incomplete last block is left out."""
-    whole = series.size // length * length
-    return series[:whole].reshape(-1, length).mean(axis=1, dtype=float)
+def block_means(rate: np.ndarray, start: np.ndarray, number: np.ndarray, length: int) -> np.ndarray:
+    """Means of adjacent blocks of `length` samples, number [S] of them from each start [S] on, one after another."""
+    within = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+    first = np.repeat(start, number) + within * length
+    # Sums from the begin of each block to its end, and from there to the next, which are not wanted.
+    borders = np.stack([first, first + length], axis=1).ravel()
+    inside = borders if borders[-1] < len(rate) else borders[:-1]
+    return np.add.reduceat(rate, inside)[::2] / length
 
 
 def exponent_by_autocorrelation(squares: np.ndarray, products: np.ndarray) -> float:
@@ -81,21 +81,23 @@ def exponent_by_autocorrelation(squares: np.ndarray, products: np.ndarray) -> fl
     return float(np.clip(-2 * (rho + differences), -4, 2))
 
 
-def _centred(values: np.ndarray) -> np.ndarray:
-    return values - values.mean()
+def exponent_by_ratio(means: np.ndarray, number: np.ndarray) -> int:
+    """0, -1 or -2 by the ratio of the sample variance to the Allan variance of block means.
 
-
-def exponent_by_ratio(blocks: list[np.ndarray]) -> int:
-    """0, -1 or -2 by the ratio of the sample variance to the Allan variance of block means."""
-    squares = sum(float(np.sum(_centred(block) ** 2)) for block in blocks)
-    steps = sum(float(np.sum(np.diff(block) ** 2)) for block in blocks)
-    samples = sum(block.size for block in blocks)
-    allan = steps / (2 * (samples - len(blocks)))
+    means : array [Σ number], those of each stretch one after another;  number [S] : of each stretch
+    """
+    first = np.cumsum(number) - number
+    centred = means - np.repeat(np.add.reduceat(means, first) / number, number)
+    squares = float(np.sum(centred**2))
+    within = np.ones(len(means) - 1, dtype=bool)
+    within[first[1:] - 1] = False
+    steps = float(np.sum(np.diff(means)[within] ** 2))
+    samples, stretches = len(means), len(number)
+    allan = steps / (2 * (samples - stretches))
     if allan == 0:
         return 0
-    measured = squares / (samples - len(blocks)) / allan
-    mean_length = samples / len(blocks)
-    expected = [_expected_ratio(mean_length, exponent) for exponent in STEPS]
+    measured = squares / (samples - stretches) / allan
+    expected = [_expected_ratio(samples / stretches, exponent) for exponent in STEPS]
     for exponent, here, beyond in zip(STEPS, expected, expected[1:], strict=False):
         if measured < np.sqrt(here * beyond):
             return exponent

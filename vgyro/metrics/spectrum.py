@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from vgyro import units
-from vgyro.metrics.allan import floating, split_segments
+from vgyro.metrics.allan import edges_of
 
 FEWEST_SAMPLES = 8
 HANN_BINS = 1.5  # equivalent noise bandwidth of the Hann window, in bins
@@ -47,32 +48,32 @@ def spectral_density(
     returns : Spectrum; empty if no stretch has 8 samples
     Hann window, half overlap, each Welch segment's mean removed.  Welch (1967), IEEE Trans. Audio Electroacoust. 15(2).
     """
-    pieces = split_segments(floating(rate), segment)
-    longest = max((piece.size for piece in pieces), default=0)
+    rate = np.asarray(rate, dtype=float)
+    edges = edges_of(len(rate), segment)
+    longest = int(np.diff(edges).max(initial=0))
     if longest < FEWEST_SAMPLES:
         return Spectrum(np.empty(0), np.empty(0), 0)
     length = min(max(round(welch_s * rate_hz), FEWEST_SAMPLES), longest)
+    step = length - length // 2
+    cuts = [(start, stop) for start, stop in itertools.pairwise(edges.tolist()) if stop - start >= length]
+    starts = np.concatenate([np.arange(start, stop - length + 1, step) for start, stop in cuts])
     # The periodic Hann window; its power and the bins that stand for two make the density one-sided.
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)
-    power, total = np.zeros(length // 2 + 1), 0
-    for piece in pieces:
-        if piece.size >= length:
-            parts = np.lib.stride_tricks.sliding_window_view(piece, length)[:: length - length // 2]
-            power += _summed_power(parts, window)
-            total += len(parts)
+    power = _summed_power(rate, starts, window)
     power[1 : (length + 1) // 2] *= 2
-    density = np.sqrt(power / (total * rate_hz * np.sum(window**2)))
-    return Spectrum(np.fft.rfftfreq(length, 1 / rate_hz), density, total)
+    density = np.sqrt(power / (len(starts) * rate_hz * np.sum(window**2)))
+    return Spectrum(np.fft.rfftfreq(length, 1 / rate_hz), density, len(starts))
 
 
-def _summed_power(parts: np.ndarray, window: np.ndarray) -> np.ndarray:
-    """Σ |rfft(window · (part - its mean))|² over parts [P, L], a few at a time."""
+def _summed_power(rate: np.ndarray, starts: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """Σ |rfft(window · (part - its mean))|² over the parts of `rate` from starts [P] on, a few at a time."""
     from scipy.fft import rfft
 
     power = np.zeros(len(window) // 2 + 1)
+    parts = np.lib.stride_tricks.sliding_window_view(rate, len(window))
     batch = max(BATCH // len(window), 1)
-    for start in range(0, len(parts), batch):
-        some = parts[start : start + batch].astype(float)
+    for first in range(0, len(starts), batch):
+        some = parts[starts[first : first + batch]]
         some -= some.mean(axis=1, keepdims=True)
         some *= window
         transform = rfft(some, overwrite_x=True).view(float)

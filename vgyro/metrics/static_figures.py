@@ -96,7 +96,7 @@ def _add_moments(
 
 def without_means(values: np.ndarray, segment: np.ndarray) -> np.ndarray:
     """values [T] with the mean of each stretch taken off."""
-    return np.concatenate([piece - piece.mean(dtype=float) for piece in split_segments(values, segment)])
+    return np.concatenate([piece - piece.mean() for piece in split_segments(values, segment)])
 
 
 def _factors(

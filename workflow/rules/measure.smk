@@ -14,7 +14,7 @@ rule measure:
     benchmark:
         "results/benchmarks/{dataset}/{recording}/{axis}/measure.tsv"
     resources:
-        mem_mb=4000,
+        mem_mb=1500,
         runtime=60,
     params:
         options=stage("board", "engine", "metrics"),

@@ -68,9 +68,26 @@ def test_lag_products_equal_the_reference(kind: str, samples: int):
     np.testing.assert_allclose(products, expected_products, rtol=1e-9, atol=1e-9 * expected_squares.max())
 
 
-def test_constant_series_has_nothing():
-    assert not allan.second_differences(np.full(500, 3.0), 1.0, np.array([1, 10]))[0].any()
-    assert not allan.lag_products(np.full(500, 3.0), np.array([1, 10]))[0].any()
+def test_stretches_are_summed_without_bridging():
+    rate, edges = series("drifting", 50_000), np.array([0, 3, 10, 10, 5_000, 20_001, 20_050, 50_000])
+    factors = np.array([1, 2, 3, 16, 500, 5_000, 9_000, 15_000])
+    for share in (2, 3):
+        sums, counts = allan.second_differences(rate, RATE_HZ, factors, edges, share)
+        expected, number = reference.second_differences(rate, RATE_HZ, factors, edges, share)
+        np.testing.assert_array_equal(counts, number)
+        np.testing.assert_allclose(sums, expected, rtol=1e-12)
+    assert number[-1] == 0 < number[-2]
+    found = allan.lag_products(rate, factors, edges, 30)
+    for ours, theirs in zip(found, reference.lag_products(rate, factors, edges, 30), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * ours.max())
+    with pytest.raises(ValueError, match="edges"):
+        allan.second_differences(rate, RATE_HZ, factors, np.array([0, 60_000]))
+
+
+@pytest.mark.parametrize("value", [3.0, 0.1, -1e-7])
+def test_constant_series_has_nothing(value: float):
+    assert not allan.second_differences(np.full(501, value), 1.0, np.array([1, 10]))[0].any()
+    assert not allan.lag_products(np.full(501, value), np.array([1, 10]))[0].any()
 
 
 @pytest.mark.parametrize("alpha", [-4, -2, -1, 0, 1, 2])

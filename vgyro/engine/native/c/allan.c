@@ -11,35 +11,54 @@ VG_INLINE v4 allan_load(const double *from) {
 #define VG_KERNELS "allan_kernels.h"
 #include "each_isa.h"
 
-/* Terms of vg_allan_lags that are added up before they are added to the total. */
+/* Terms that are added up before they are added to a total. */
 enum { PART = 512 };
 
-void vg_allan_angle(const double *rate, size_t n, double level, double slope, double *angle) {
-    double sum = 0;
-    angle[0] = 0;
-    for (size_t k = 0; k < n; k++) angle[k + 1] = sum += rate[k] - (level + slope * (double)k);
+/* Σ (rate - base) */
+static double sum_about(const double *rate, size_t n, double base) {
+    double total = 0;
+    for (size_t k = 0; k < n;) {
+        double part = 0;
+        for (size_t stop = k + PART < n ? k + PART : n; k < stop; k++) part += rate[k] - base;
+        total += part;
+    }
+    return total;
 }
 
-void vg_allan_angle_single(const float *rate, size_t n, double level, double slope, double *angle) {
-    double sum = 0;
-    angle[0] = 0;
-    for (size_t k = 0; k < n; k++) angle[k + 1] = sum += rate[k] - (level + slope * (double)k);
+void vg_allan_angle(const double *rate, const int64_t *edge, size_t stretches, int level, double *angle) {
+    for (size_t p = 0; p < stretches; p++) {
+        const double *r = rate + edge[p];
+        size_t n = (size_t)(edge[p + 1] - edge[p]), half = n / 2;
+        double *x = angle + edge[p] + p, sum = 0, slope = 0;
+        /* Counted from the first rate, so that a constant is exact. */
+        double base = n ? r[0] : 0, middle = n % 2 ? r[half] - base : 0;
+        double early = sum_about(r, half, base), late = sum_about(r + n - half, half, base);
+        if (level && half) slope = (late - early) / (double)half / (double)(n - half);
+        double start = n ? base + (early + middle + late) / (double)n - slope * (double)(n - 1) / 2 : 0;
+        x[0] = 0;
+        for (size_t k = 0; k < n; k++) x[k + 1] = sum += r[k] - (start + slope * (double)k);
+    }
 }
 
-void vg_allan_second(const double *angle, size_t points, const int64_t *factor, size_t factors, size_t blocks,
-                     size_t first, size_t last, double *sums) {
-    VG_CHOOSE(allan_second)(angle, points, factor, factors, blocks, first, last, sums);
+void vg_allan_second(const double *angle, const vg_allan_block *block, const int64_t *factor, size_t factors,
+                     size_t blocks, size_t first, size_t last, double *sums) {
+    VG_CHOOSE(allan_second)(angle, block, factor, factors, blocks, first, last, sums);
 }
 
-void vg_allan_lags(const double *angle, size_t m, size_t n, double *sums) {
-    double a = angle[3 * m], y = a - angle[2 * m], before = angle[2 * m] - angle[m], w = y - before;
-    double v = w - (before - (angle[m] - angle[0])), first = angle[m] - angle[0];
-    double total[VG_ALLAN_SUMS] = {
-        angle[m] + angle[2 * m] + a,         first * first + before * before + y * y, first * before + before * y,
-        (w - v) * (w - v) + w * w, (w - v) * w, v * v, 0,
-    };
+/* For y, the differences of every m-th angle a (n >= 4 of them), w those of y and v those of w:
+   Σ_{k≥1} a, Σ y², Σ y y', Σ w², Σ w w', Σ v², Σ v v'. */
+static void lag_sums(const double *angle, size_t m, size_t n, double *total) {
+    double a = angle[3 * m], y = a - angle[2 * m], before = angle[2 * m] - angle[m], first = angle[m] - angle[0];
+    double w = y - before, w_before = before - first, v = w - w_before;
+    total[0] = angle[m] + angle[2 * m] + a;
+    total[1] = first * first + before * before + y * y;
+    total[2] = first * before + before * y;
+    total[3] = w_before * w_before + w * w;
+    total[4] = w_before * w;
+    total[5] = v * v;
+    total[6] = 0;
     for (size_t k = 4; k <= n;) {
-        double part[VG_ALLAN_SUMS] = {0};
+        double part[7] = {0};
         for (size_t stop = k + PART < n + 1 ? k + PART : n + 1; k < stop; k++) {
             double a_next = angle[k * m], y_next = a_next - a, w_next = y_next - y, v_next = w_next - w;
             part[0] += a_next;
@@ -51,7 +70,48 @@ void vg_allan_lags(const double *angle, size_t m, size_t n, double *sums) {
             part[6] += v_next * v;
             a = a_next, y = y_next, w = w_next, v = v_next;
         }
-        for (int i = 0; i < VG_ALLAN_SUMS; i++) total[i] += part[i];
+        for (int i = 0; i < 7; i++) total[i] += part[i];
     }
-    memcpy(sums, total, sizeof total);
+}
+
+/* Adds one stretch of n means. The means and the line are taken off in closed form: with u = y - ȳ, p_k = k - (n-1)/2 and
+   the slope b = Σpu / Σp²,  Σ(u - bp)² = Σu² - bΣpu  and
+   Σ(u - bp)(u' - bp') = Σuu' - b(2Σpu + (n+1)/2·(u_first - u_last)) + b²(Σp² - (n²-1)/4). */
+static void add_stretch(const double *angle, size_t m, size_t n, double *squares, double *products) {
+    double sums[7], first[3], last[3], square[3], product[3], scale = 1 / ((double)m * (double)m);
+    lag_sums(angle, m, n, sums);
+    double head[3], tail[3];
+    for (size_t i = 0; i < 3; i++) {
+        head[i] = angle[(i + 1) * m] - angle[i * m];
+        tail[i] = angle[(n - 2 + i) * m] - angle[(n - 3 + i) * m];
+    }
+    for (int order = 0; order < 3; order++) {
+        first[order] = head[0], last[order] = tail[2 - order];
+        for (int i = 0; i + order < 2; i++) head[i] = head[i + 1] - head[i], tail[i] = tail[i + 1] - tail[i];
+    }
+    double end = angle[n * m], total[3] = {end, last[0] - first[0], last[1] - first[1]};
+    for (int order = 0; order < 3; order++) {
+        double number = (double)n - order, mean = total[order] / number;
+        square[order] = sums[1 + 2 * order] - mean * total[order];
+        product[order] = sums[2 + 2 * order] - mean * (2 * total[order] - first[order] - last[order]);
+        product[order] += (number - 1) * mean * mean;
+    }
+    double d = (double)n, half = (d + 1) / 2, along = half * end - sums[0], spread = d * (d * d - 1) / 12;
+    double slope = along / spread;
+    square[0] -= slope * along;
+    product[0] -= slope * (2 * along + half * (first[0] - last[0]));
+    product[0] += slope * slope * (spread - (d * d - 1) / 4);
+    for (int order = 0; order < 3; order++) {
+        squares[order] += square[order] > 0 ? square[order] * scale : 0;
+        products[order] += product[order] * scale;
+    }
+}
+
+void vg_allan_lags(const double *angle, const int64_t *edge, size_t stretches, size_t m, size_t fewest, double *squares,
+                   double *products) {
+    for (int order = 0; order < 3; order++) squares[order] = products[order] = 0;
+    for (size_t p = 0; p < stretches; p++) {
+        size_t n = (size_t)(edge[p + 1] - edge[p]) / m;
+        if (n >= fewest) add_stretch(angle + edge[p] + p, m, n, squares, products);
+    }
 }

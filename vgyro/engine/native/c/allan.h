@@ -8,20 +8,26 @@
 /* Second differences that are summed by themselves; the sums of blocks are added by the caller. */
 enum { VG_ALLAN_BLOCK = 2048 };
 
-/* Sums for each averaging factor, see vg_allan_lags. */
-enum { VG_ALLAN_SUMS = 7 };
+/* Some second differences of one stretch: of the angles from `at` on, `left` of them to the end of the stretch, for
+   averaging factors up to `most`. */
+typedef struct {
+    int64_t at, left, most;
+} vg_allan_block;
 
-/* angle[0] = 0, angle[k + 1] = angle[k] + rate[k] - (level + slope·k).  rate [n], angle [n + 1] */
-void vg_allan_angle(const double *rate, size_t n, double level, double slope, double *angle);
-void vg_allan_angle_single(const float *rate, size_t n, double level, double slope, double *angle);
+/* Angle of each stretch edge[p] … edge[p + 1] - 1 about its mean: angle[0] = 0, angle[k + 1] = angle[k] + rate[k] - mean;
+   with `level`, a line through the means of both halves is taken off as well. angle [T + stretches], one stretch after
+   another, each a point longer than its rates. */
+void vg_allan_angle(const double *rate, const int64_t *edge, size_t stretches, int level, double *angle);
 
-/* Blocks first … last - 1 of sums [factors, blocks]: Σ (x[k+2m] - 2x[k+m] + x[k])² over k of the block; 0 where there is
-   no k.  angle x [points]; blocks: those of the whole series, each VG_ALLAN_BLOCK long. */
-void vg_allan_second(const double *angle, size_t points, const int64_t *factor, size_t factors, size_t blocks,
-                     size_t first, size_t last, double *sums);
+/* Columns first … last - 1 of sums [factors, blocks]: Σ (x[k+2m] - 2x[k+m] + x[k])², x the angle, over the block's k that
+   have an x[k+2m]; 0 where m is more than its `most`. */
+void vg_allan_second(const double *angle, const vg_allan_block *block, const int64_t *factor, size_t factors,
+                     size_t blocks, size_t first, size_t last, double *sums);
 
-/* For y, the differences of every m-th angle a (n of them), w those of y and v those of w:
-   sums [VG_ALLAN_SUMS] = Σ_{k≥1} a, Σ y², Σ y y', Σ w², Σ w w', Σ v², Σ v v', with ' the next one in time.  n >= 4 */
-void vg_allan_lags(const double *angle, size_t m, size_t n, double *sums);
+/* squares, products [3] = Σ z², Σ z z' over all stretches, z the means of m rates about their line, the differences of
+   the means about their mean, the second differences about theirs; z' is the next one. Only stretches with at least
+   `fewest` (>= 4) means. angle and edge as above, leveled or not: that changes rounding alone. */
+void vg_allan_lags(const double *angle, const int64_t *edge, size_t stretches, size_t m, size_t fewest, double *squares,
+                   double *products);
 
 #endif
