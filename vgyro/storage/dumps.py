@@ -53,6 +53,12 @@ class DumpReader:
         self._segment = 0
         self._watches = channel_watches(self.board, engine=self.engine)
 
+    @property
+    def expected_frames(self) -> int:
+        """As many as the files could hold if they were not compressed; 0 for text."""
+        layout = self.board.layout
+        return sum(file.size for file in self._sources.files) // layout.length if isinstance(layout, BinaryFrame) else 0
+
     def __iter__(self) -> Iterator[Frames]:
         """Decode chunk by chunk.  raises : Refused"""
         # Once glibc has seen so large an array go, it keeps freed memory for the next chunk instead of mapping it anew.

@@ -30,9 +30,15 @@ class Frames(NamedTuple):
 
 
 class Reader(Protocol):
-    """Chunks of frames; `integrity` is complete when the last one is read."""
+    """Chunks of frames; `integrity` is complete when the last one is read.
+
+    expected_frames : about how many there are, for whoever wants room for them
+    """
 
     integrity: Integrity | None
+
+    @property
+    def expected_frames(self) -> int: ...
 
     def __iter__(self) -> Iterator[Frames]:
         """raises : Refused if the recording cannot be used, which may show only at its end"""
@@ -40,17 +46,24 @@ class Reader(Protocol):
 
 def gather(reader: Reader, board: Board) -> Frames:
     """All chunks of a reader as one."""
-    chunks = list(reader) or [empty_frames(board)]
-
-    def whole(parts: list[np.ndarray]) -> np.ndarray:
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-    return Frames(
-        {name: whole([chunk.counts.pop(name) for chunk in chunks]) for name in list(chunks[0].counts)},
-        whole([chunk.counter for chunk in chunks]),
-        whole([chunk.time for chunk in chunks]),
-        whole([chunk.segment for chunk in chunks]),
-    )
+    whole: list[np.ndarray] = []
+    names: list[str] = []
+    count = 0
+    for chunk in reader:
+        names = list(chunk.counts)
+        columns = [chunk.counter, chunk.time, chunk.segment, *chunk.counts.values()]
+        stop = count + len(chunk.counter)
+        if not whole:
+            whole = [np.empty(max(stop, reader.expected_frames), dtype=column.dtype) for column in columns]
+        if stop > len(whole[0]):
+            whole = [np.concatenate([column[:count], np.empty(stop, dtype=column.dtype)]) for column in whole]
+        for column, values in zip(whole, columns, strict=True):
+            column[count:stop] = values
+        count = stop
+    if not whole:
+        return empty_frames(board)
+    counter, time, segment, *counts = (column[:count] for column in whole)
+    return Frames(dict(zip(names, counts, strict=True)), counter, time, segment)
 
 
 def empty_frames(board: Board) -> Frames:

@@ -80,6 +80,11 @@ class LogReader:
         self._raw = 0.0  # time column of the last row
         self._shifted = False  # true once the time column went back
 
+    @property
+    def expected_frames(self) -> int:
+        """As many as the logs have rows."""
+        return sum(pq.read_metadata(path).num_rows for path in self._files)
+
     def __iter__(self) -> Iterator[Frames]:
         """Read row group by row group.  raises : DataError, Refused"""
         wanted = list(dict.fromkeys([*self._columns.values(), *([self.log.time] if self.log.time else [])]))
