@@ -57,7 +57,7 @@ rule noise:
     benchmark:
         "results/benchmarks/{dataset}/noise/{axis}.tsv"
     resources:
-        mem_mb=3000,
+        mem_mb=1500,
         runtime=30,
     params:
         options=stage("board", "metrics"),
