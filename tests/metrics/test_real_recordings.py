@@ -93,5 +93,5 @@ def test_adis_curves(shared_data: Path, recording: str):
         assert 20 < 3600 * fit.B.value < 45
         density = noise_density(spectral_density(rates[:, column], ADIS_HZ), (0.5, 10.0)).value
         assert density == pytest.approx(fit.N.value, rel=0.03)
-    correlation = correlation_matrix(rates, ADIS_HZ)
+    correlation = correlation_matrix(rates.T, ADIS_HZ)
     assert np.abs(correlation.value[np.triu_indices(3, 1)]).max() < 0.1
