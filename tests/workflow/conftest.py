@@ -48,8 +48,8 @@ class Lab:
         return {str(path.relative_to(self.folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in kept}
 
 
-def make_lab(folder: Path, root: Path) -> Lab:
-    """Copy the project and simulate the small data set."""
+def make_lab(folder: Path, root: Path, twin: str = "tiny") -> Lab:
+    """Copy the project and simulate a data set."""
     for name in COPIED:
         source = root / name
         if source.is_dir():
@@ -58,7 +58,7 @@ def make_lab(folder: Path, root: Path) -> Lab:
             shutil.copy(source, folder / name)
     shutil.copy(HERE / "tiny.yaml", folder / "config" / "twins" / "tiny.yaml")
     lab = Lab(folder)
-    made = lab.vgyro("simulate", "tiny", "--out", "raw/tiny")
+    made = lab.vgyro("simulate", twin, "--out", f"raw/{twin}")
     assert made.returncode == 0, made.stdout
     return lab
 
@@ -67,3 +67,9 @@ def make_lab(folder: Path, root: Path) -> Lab:
 def lab(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Lab:
     """A lab with the small data set in raw/tiny."""
     return make_lab(tmp_path_factory.mktemp("lab"), root)
+
+
+@pytest.fixture(scope="module")
+def demo_lab(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    """A lab with the demo board in raw/demo."""
+    return make_lab(tmp_path_factory.mktemp("demo"), root, "demo")

@@ -7,8 +7,9 @@ allan   : overlapping Allan deviation
 kalman  : filters and smoother of a scalar rate
 frames  : frames of a serial dump: synchronisation and checksums
 
-Each is a module, loaded at first use: `vgyro.engine.get("native").garch.fit_garch(...)`. The kernels are compiled for
-several instruction sets and chosen at run time; their results have the same bits on each, and for any number of threads.
+Each is a module, loaded at first use: `vgyro.engine.get("native").garch.fit_garch(...)`. The kernels are compiled
+for several instruction sets and chosen at run time; their results have the same bits on each, and for any number of
+threads.
 """
 
 from __future__ import annotations

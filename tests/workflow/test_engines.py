@@ -1,0 +1,87 @@
+"""The demo board on both engines: C kernels and libraries must tell the same story.
+
+Tolerances. Figures without a fitted window: 1e-9 of their size. Figures of DCC and CCC weights: a tenth of the width of
+their own 95 % interval, because two searches may end on different points of a flat likelihood. Likelihoods: the native
+engine is nowhere worse by more than 1e-5 a sample.
+"""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+pytestmark = [pytest.mark.workflow, pytest.mark.timeout(1800)]
+
+FITTED = ("dcc_", "ccc_")
+KEY = ["recording", "axis", "method", "definition", "metric"]
+LIKELIHOOD_A_SAMPLE = 1e-5
+
+
+@pytest.fixture(scope="module")
+def runs(demo_lab) -> dict[str, Path]:
+    """Engine → results/demo."""
+    lab, kept = demo_lab, {}
+    for engine in ("native", "reference"):
+        config = lab.folder / "config/config.yaml"
+        text = config.read_text(encoding="utf-8")
+        config.write_text(text.replace("engine: native", f"engine: {engine}"), encoding="utf-8")
+        assert f"engine: {engine}" in config.read_text(encoding="utf-8")
+        done = lab.run("--cores", "2")
+        assert done.returncode == 0, done.stdout
+        kept[engine] = lab.folder / f"kept-{engine}"
+        shutil.copytree(lab.folder / "results/demo", kept[engine])
+    return kept
+
+
+def joined(runs: dict[str, Path], name: str, key: list[str]) -> pd.DataFrame:
+    """Rows of all tables of that name of both runs, side by side; every row must be in both."""
+    tables = []
+    for folder in runs.values():
+        parts = []
+        for path in sorted(folder.rglob(f"{name}.parquet")):
+            parts.append(pd.read_parquet(path).assign(place=str(path.parent.relative_to(folder))))
+        tables.append(pd.concat(parts))
+    both = tables[0].merge(
+        tables[1], on=["place", *key], how="outer", suffixes=("_native", "_reference"), indicator=True
+    )
+    assert (both["_merge"] == "both").all()
+    return both
+
+
+def test_every_figure_is_the_same_within_the_tolerance(runs):
+    both = joined(runs, "metrics", KEY)
+    difference = (both["value_native"] - both["value_reference"]).abs()
+    assert (both["value_native"].isna() == both["value_reference"].isna()).all()
+    width = (both["high_reference"] - both["low_reference"]).fillna(0.0)
+    fitted = both["method"].str.startswith(FITTED)
+    exact = 1e-9 * both["value_reference"].abs() + 1e-15
+    allowed = np.where(fitted, exact + 0.1 * width + 1e-3 * both["value_reference"].abs(), exact)
+    wrong = both[difference > allowed]
+    assert not len(wrong), wrong[
+        [*KEY, "value_native", "value_reference", "low_reference", "high_reference"]
+    ].to_string()
+    assert fitted.any()
+    assert (~fitted).any()
+
+
+def test_no_likelihood_of_the_native_engine_is_worse(runs):
+    for name, key in (("garch", ["window", "gyro"]), ("dcc", ["window"])):
+        both = joined(runs, name, key)
+        fitted = both["log_likelihood_reference"].notna() & (both["status_reference"] != "failed")
+        samples = both["stop_native"] - both["start_native"]
+        if name == "dcc":
+            # The second stage is only comparable where both margins are the same fit.
+            same = both["log_likelihood_ccc_native"] - both["log_likelihood_ccc_reference"]
+            fitted &= same.abs() < 1e-4
+        lack = (both["log_likelihood_reference"] - both["log_likelihood_native"])[fitted] / samples[fitted]
+        assert fitted.mean() > 0.5
+        assert lack.max() <= LIKELIHOOD_A_SAMPLE, both.loc[lack.idxmax()].to_string()
+
+
+def test_the_cross_check_of_the_native_run_passes(runs):
+    paths = sorted(runs["native"].rglob("crosscheck.parquet"))
+    rows = pd.concat([pd.read_parquet(path) for path in paths])
+    assert len(rows) > 20
+    assert rows["passed"].all(), rows[~rows["passed"]].to_string()
