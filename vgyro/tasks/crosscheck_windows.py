@@ -22,10 +22,10 @@ from vgyro.tasks.volatility_series import ArraySeries, open_series, stored_model
 from vgyro.volatility.check import covariance_after, greatest_log_likelihood
 from vgyro.volatility.rolling import WindowModels, rows_needed, weights_of_windows
 
-# Of one likelihood at the same parameters, a sample: rounding only.
+# Log-likelihood a sample. A search may end on a lesser maximum now and then; 0.004 in a window of 360 samples is far
+# below the 1.92 that tells two models apart.
 MAXIMUM_TOLERANCE = 1e-5
-"""Log-likelihood a sample. A search may end on a lesser maximum now and then (docs/performance.md); 0.004 in a window of
-360 samples is far below the 1.92 that tells two models apart."""
+# Of one likelihood at the same parameters, a sample: rounding only.
 STORED_TOLERANCE = 1e-9
 WEIGHT_TOLERANCE = 1e-8
 # What the other engine is made of.
