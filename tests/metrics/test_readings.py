@@ -140,9 +140,9 @@ def test_noise_from_differences_under_motion():
     truth = np.array([1.0, 1.0, 3.0, 1.2]) * N
     motion = 50 * np.sin(np.arange(30_000) / 40)
     rate = motion[:, None] + truth * np.sqrt(50.0) * rng.standard_normal((30_000, 4))
-    found, _ = noise_from_differences(rate, 50.0)
+    found, _ = noise_from_differences(rate.T, 50.0)
     np.testing.assert_allclose(found, truth, rtol=0.06)
-    one, _ = noise_from_differences(rate[:, :1], 50.0)
+    one, _ = noise_from_differences(rate.T[:1], 50.0)
     assert math.isnan(one[0])
-    two, _ = noise_from_differences(rate[:, :2], 50.0)
+    two, _ = noise_from_differences(rate.T[:2], 50.0)
     np.testing.assert_allclose(two, N, rtol=0.05)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,26 +15,28 @@ REPLICATES = 50
 
 
 def noise_from_differences(
-    rate: np.ndarray, rate_hz: float, segment: np.ndarray | None = None, engine: str = "native"
+    series: Sequence[np.ndarray], rate_hz: float, segment: np.ndarray | None = None, engine: str = "native"
 ) -> tuple[np.ndarray, np.ndarray]:
     """N deg/s/√Hz (two-sided) and K deg/s/√s of each gyro from the fits to all pairwise differences.
 
-    rate    : array [T, N], deg/s, in motion or not;  segment : array [T] int
+    series  : N arrays [T], deg/s, in motion or not, two at a time are held;  segment : array [T] int
     returns : N [N], K [N]; NaN for a single gyro. The squares of a difference are the sum of two gyros' squares (their
               noise taken as independent): non-negative least squares over the pairs. Two gyros share equally.
     The N-cornered hat of Gray & Allan (1974). Gyros of unequal scale leave a part of the motion in K.
     """
     from scipy.optimize import nnls
 
-    number = rate.shape[1]
+    number = len(series)
     if number < 2:
         return np.full(number, math.nan), np.full(number, math.nan)
     pairs = list(itertools.combinations(range(number), 2))
     squares = np.zeros((len(pairs), 2))
-    for row, (one, other) in enumerate(pairs):
-        curve = allan_deviation(rate[:, one] - rate[:, other], rate_hz, segment=segment, engine=engine)
-        fit = noise_coefficients(curve, replicates=REPLICATES)
-        squares[row] = fit.N.value**2, fit.K.value**2
+    for one in range(number - 1):
+        rate = series[one]
+        for other in range(one + 1, number):
+            curve = allan_deviation(rate - series[other], rate_hz, segment=segment, engine=engine)
+            fit = noise_coefficients(curve, replicates=REPLICATES)
+            squares[pairs.index((one, other))] = fit.N.value**2, fit.K.value**2
     if number == 2:
         shares = np.repeat(squares / 2, 2, axis=0)
     else:

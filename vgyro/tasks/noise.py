@@ -51,10 +51,11 @@ def main(task: Task) -> None:
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     path = task.inputs["rates"][0]
     frame = read_array(path, [], task.options["axis"])
+    places = [(path, gyro) for gyro in gyros]
     if rests_enough(frame):
-        found = noise_at_rest(FileColumns([(path, gyro) for gyro in gyros], frame.at_rest), frame, options, engine)
+        found = noise_at_rest(FileColumns(places, frame.at_rest), frame, options, engine)
     else:
-        found = noise_in_motion(read_array(path, gyros, task.options["axis"]), engine)
+        found = noise_in_motion(FileColumns(places), frame, engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
 
 
@@ -80,11 +81,11 @@ def noise_at_rest(
     return ArrayNoiseRecord("samples at rest", len(segment) / frame.rate_hz, fits, read, correlation)
 
 
-def noise_in_motion(array: ArrayFile, engine: str) -> ArrayNoiseRecord:
+def noise_in_motion(series: Sequence[np.ndarray], frame: ArrayFile, engine: str) -> ArrayNoiseRecord:
     """From the differences between the gyros, in which the motion cancels; correlation is then not known."""
-    number = array.rate.shape[1]
-    if len(array.rate) >= 3:
-        n, k = noise_from_differences(array.rate, array.rate_hz, array.segment, engine)
+    number = len(series)
+    if len(frame.segment) >= 3:
+        n, k = noise_from_differences(series, frame.rate_hz, frame.segment, engine)
     else:
         n, k = np.full(number, math.nan), np.full(number, math.nan)
     nothing = Coefficient(math.nan, math.nan, math.nan)
@@ -95,7 +96,7 @@ def noise_in_motion(array: ArrayFile, engine: str) -> ArrayNoiseRecord:
         for a, b in zip(n.tolist(), k.tolist(), strict=True)
     ]
     method = "differences between the gyros, no rest long enough; their correlation is taken as none"
-    return ArrayNoiseRecord(method, len(array.rate) / array.rate_hz, fits, [math.nan] * number, np.eye(number))
+    return ArrayNoiseRecord(method, len(frame.segment) / frame.rate_hz, fits, [math.nan] * number, np.eye(number))
 
 
 def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: str) -> dict[str, Any]:
