@@ -24,5 +24,5 @@ fi
 # uv checks every hash and installs in seconds; pip, which takes minutes, only fetches uv.
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r "$uv_lock"
-"$venv/bin/uv" pip sync --quiet --python "$venv/bin/python" --require-hashes "$lock"
+"$venv/bin/uv" pip sync --quiet --compile-bytecode --python "$venv/bin/python" --require-hashes "$lock"
 "$venv/bin/uv" pip install --quiet --python "$venv/bin/python" --no-deps --no-build-isolation --editable .
