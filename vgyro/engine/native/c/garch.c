@@ -7,9 +7,9 @@
    The second set of columns is for series with large outliers, whose mean square is far from their usual variance. */
 #define ROWS 8
 #define COLUMNS 4
-#define STARTS 6
+#define STARTS 8
 #define LARGE_OUTLIER 20 /* in units of the mean square */
-#define WORTH 0.5        /* share of the best gain so far that a start must have; with large outliers all are tried */
+#define WORTH 0.3        /* share of the best gain so far that a start must have; with large outliers all are tried */
 static const double row_beta[ROWS] = {0.0, 0.4, 0.7, 0.85, 0.93, 0.97, 0.99, 0.997};
 typedef struct {
     double share[COLUMNS], excess[COLUMNS];
@@ -31,6 +31,30 @@ static void add_trend(row_t *row, double beta, ptrdiff_t samples, double power, 
     row->gd = (-g / rest - gp) / rest;
     row->dd = ((double)samples - 2 * sum + squares) / (rest * rest);
     row->last = (1 - power) / rest;
+}
+
+/* Trends of the variance, α = 0: h_t = 1 + x·d_t, d_t = (1 - β^t)/(1 - β^T), for rows of 1/(1 - β) in lengths of the
+   series. They are looked at in coarse bins of time, d at their middles: it is only to find where to begin. */
+#define BINS 32
+static const double row_length[ROWS] = {0.1, 0.2, 0.4, 0.8, 1.6, 4, 12, INFINITY};
+typedef struct {
+    double beta[ROWS], change[ROWS], least[ROWS]; /* 1 - β^T, and the least x */
+    double d[ROWS][BINS];
+    ptrdiff_t bins;
+} trends_t;
+
+static void set_trends(trends_t *trends, ptrdiff_t samples, double omega_min, double most) {
+    const ptrdiff_t bins = trends->bins = samples < BINS ? samples : BINS;
+    for (int i = 0; i < ROWS; i++) {
+        double beta = fmin(exp(-1 / (row_length[i] * (double)samples)), most), rate = log(beta);
+        trends->beta[i] = beta;
+        trends->change[i] = -expm1(rate * (double)samples);
+        trends->least[i] = (omega_min / (1 - beta) - 1) * trends->change[i];
+        for (ptrdiff_t b = 0; b < bins; b++) {
+            double middle = 0.5 * (double)(b * samples / bins + (b + 1) * samples / bins + 1);
+            trends->d[i][b] = -expm1(rate * middle) / trends->change[i];
+        }
+    }
 }
 
 /* One series on its way: the points that its searches begin at, in order of their cost, and the best optimum so far. */
@@ -89,13 +113,21 @@ static void add_optima(series_t *series, double (*x)[3], const double *cost, dou
             add_start(series, x[i], cost[i]);
 }
 
-/* Where the searches of a series begin; `shifted` are its rows with the robust columns. */
-static void choose(const row_t *rows, const row_t *shifted, ptrdiff_t samples, series_t *series) {
+/* Where the searches of a series begin; `shifted` are its rows with the robust columns, slope the best x of each trend. */
+static void choose(const row_t *rows, const row_t *shifted, const trends_t *trends, const v4 *slope, const v4 *slope_cost,
+                   int lane, ptrdiff_t samples, series_t *series) {
     double x[ROWS][3], cost[ROWS];
     best_columns(rows, &usual, x, cost);
     add_optima(series, x, cost, 0.5);
     for (int i = 0; i < ROWS; i++) cost[i] = scored(&rows[i], row_beta[i], samples, x[i]);
     add_optima(series, x, cost, INFINITY);
+    for (int i = 0; i < ROWS; i++) {
+        x[i][0] = (1 + slope[i][lane] / trends->change[i]) * (1 - trends->beta[i]);
+        x[i][1] = 0;
+        x[i][2] = trends->beta[i];
+        cost[i] = slope_cost[i][lane];
+    }
+    add_optima(series, x, cost, 0.5);
     if (series->outlier) {
         best_columns(shifted, &robust, x, cost);
         add_optima(series, x, cost, INFINITY);

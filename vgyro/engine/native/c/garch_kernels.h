@@ -9,6 +9,7 @@ VG_INLINE v4 VG(mantissa)(v4 x, m4 *power) {
 
 VG_INLINE double VG(log_of)(double mantissa, int64_t power) { return log(mantissa) + (double)power * M_LN2; }
 
+#define STEPS 3
 #define BLOCK 16 /* samples between two looks at the exponent */
 
 /* Loads four series in lane order, in units of their mean squares; sets outcome, mean_square and largest_share. */
@@ -118,17 +119,61 @@ VG_INLINE void VG(row)(const v4 *square, ptrdiff_t samples, double beta, const c
     }
 }
 
+/* The best x of each trend, of four series, by three steps of Newton's method, and its cost. */
+static void VG(trend)(const v4 *square, ptrdiff_t samples, const trends_t *trends, v4 *x, v4 *cost) {
+    const v4 one = v4_set(1), half = v4_set(0.5), quarter = v4_set(0.25), four = v4_set(4);
+    v4 mean[BINS];
+    for (ptrdiff_t b = 0; b < trends->bins; b++) {
+        ptrdiff_t begin = b * samples / trends->bins, end = (b + 1) * samples / trends->bins;
+        mean[b] = v4_set(0);
+        for (ptrdiff_t t = begin; t < end; t++) mean[b] += square[t];
+        mean[b] /= v4_set((double)(end - begin));
+    }
+    for (int i = 0; i < ROWS; i++) {
+        const v4 least = v4_set(trends->least[i]);
+        v4 at = v4_set(0);
+        for (int step = 0; step < STEPS; step++) {
+            v4 slope = v4_set(0), curvature = v4_set(0), metric = v4_set(1e-12);
+            for (ptrdiff_t b = 0; b < trends->bins; b++) {
+                v4 d = v4_set(trends->d[i][b]), u = one / (one + at * d), z = mean[b] * u, p = d * u;
+                slope += p * (z - one);
+                curvature += p * p * (z + z - one);
+                metric += p * p;
+            }
+            v4 next = at + slope / v4_max(curvature, half * metric);
+            next = v4_min(v4_max(next, quarter * (one + at) - one), four * (one + at) - one);
+            at = v4_max(next, least);
+        }
+        v4 product = one, sum = v4_set(0);
+        m4 power = {0, 0, 0, 0};
+        for (ptrdiff_t b = 0; b < trends->bins; b++) {
+            v4 h = one + at * v4_set(trends->d[i][b]);
+            sum += mean[b] / h - mean[b];
+            product *= h;
+            if (b % BLOCK == BLOCK - 1) product = VG(mantissa)(product, &power);
+        }
+        product = VG(mantissa)(product, &power);
+        x[i] = at;
+        for (int lane = 0; lane < VG_LANES; lane++) {
+            double gain = VG(log_of)(product[lane], power[lane]) + sum[lane];
+            cost[i][lane] = 0.5 + 0.5 * gain / (double)trends->bins;
+        }
+    }
+}
+
 /* Looks at all points of the grid, and says where the searches of four series begin. */
-static void VG(begin)(const v4 *square, ptrdiff_t samples, series_t *series) {
+static void VG(begin)(const v4 *square, ptrdiff_t samples, const trends_t *trends, series_t *series) {
+    v4 x[ROWS], cost[ROWS];
     row_t rows[VG_LANES * ROWS], shifted[VG_LANES * ROWS];
     v4 most = v4_set(0);
     for (ptrdiff_t t = 0; t < samples; t++) most = v4_max(most, square[t]);
     m4 outlier = most > LARGE_OUTLIER;
     for (int i = 0; i < ROWS; i++) VG(row)(square, samples, row_beta[i], &usual, 0, rows + i);
     for (int i = 0; i < ROWS && m4_any(outlier); i++) VG(row)(square, samples, row_beta[i], &robust, 1, shifted + i);
+    VG(trend)(square, samples, trends, x, cost);
     for (int lane = 0; lane < VG_LANES; lane++) {
         series[lane] = (series_t){.best = {1, 0, 0}, .best_cost = 0.5, .outlier = outlier[lane] != 0};
-        choose(rows + lane * ROWS, shifted + lane * ROWS, samples, &series[lane]);
+        choose(rows + lane * ROWS, shifted + lane * ROWS, trends, x, cost, lane, samples, &series[lane]);
     }
 }
 
@@ -252,10 +297,12 @@ static void VG(search)(const v4 *square, ptrdiff_t samples, const vg_garch_searc
 static void VG(fit_piece)(const vg_garch_data_t *data, const vg_garch_search_t *search, ptrdiff_t first, ptrdiff_t stop,
                           v4 *square, v4 *work, series_t *series, vg_garch_fit_t *fit) {
     const ptrdiff_t samples = data->samples, count = stop - first;
+    trends_t trends;
+    set_trends(&trends, samples, search->omega_min, search->persistence_max);
     for (ptrdiff_t i = 0; i < count; i += VG_LANES) {
         v4 *four = square + i / VG_LANES * samples;
         VG(load)(data, first + i, stop, search->flat, four, fit + i);
-        VG(begin)(four, samples, series + i);
+        VG(begin)(four, samples, &trends, series + i);
     }
     VG(search)(square, samples, search, series, count, work);
     for (ptrdiff_t i = 0; i < count; i += VG_LANES) {

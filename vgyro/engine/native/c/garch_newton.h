@@ -16,7 +16,8 @@ enum { SEARCHING, ENDED };
 #define PASSES 100     /* at most, for one search */
 #define RADIUS 0.3     /* of the first step: about the relative change of h */
 #define FLATTEST 1e-9  /* least curvature, in units of the metric */
-#define SAME 0.03      /* distance, in units of the metric, at which two optima count as one */
+#define SAME 0.03      /* distance, in units of the metric, at which two optima may count as one */
+#define SAME_GAIN 0.1  /* its square, at most, as a share of the gain over the constant variance */
 
 /* cost, slope and curvature of ½·mean(log h + e²/h); metric: diagonal of its expected curvature;
    outer: mean of the outer product of the scores. Symmetric matrices as 00 01 02 11 12 22. */
@@ -214,7 +215,7 @@ static int is_near(const newton_t *n, const double *known, double cost) {
     double away[3] = {0, known[1] - n->x[1], known[2] - n->x[2]}, distance = 0;
     away[0] = known[0] - n->x[0] + away[1] + away[2];
     for (int i = 0; i < 3; i++) distance += n->at.metric[i] * away[i] * away[i];
-    return n->at.cost > cost && distance < SAME * SAME;
+    return n->at.cost > cost && distance < fmin(SAME * SAME, SAME_GAIN * (0.5 - cost));
 }
 
 /* Takes the derivatives at n->trial and asks for the next trial; ENDED: n->x and n->at.cost are the optimum. */
