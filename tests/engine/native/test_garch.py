@@ -50,6 +50,8 @@ def kinds_of_windows(rng, each, samples):
         start, length = rng.integers(0, samples - 60), rng.integers(5, 60)
         column[start : start + length] = column[start]
     long = garch_series(rng, 1, samples + 30 * each, 0.05, 0.93)[:, 0]
+    pace = 10 ** rng.uniform(-2, -0.5, each)
+    drift = np.cumsum(noise() * pace, axis=0) + rng.uniform(-1, 1, each) * rng.exponential(3, each)
     return {
         "of the paper": garch_series(rng, 2 * each, samples, 0.05, 0.9),
         "random": garch_series(rng, each, samples, share, rng.uniform(0, 1, each) * (0.999 - share)),
@@ -58,6 +60,7 @@ def kinds_of_windows(rng, each, samples):
         "step of the variance": noise() * np.where(time_ >= step, rng.uniform(0.2, 5, each), 1),
         "outliers": outliers,
         "trend": noise() + time_ / samples * rng.uniform(-4, 4, each),
+        "level that drifts": noise() + drift,
         "t of 3": rng.standard_t(3, (samples, each)),
         "GARCH with t of 3": garch_series(
             rng, each, samples, 0.1, 0.85, lambda n: rng.standard_t(3, n) / np.sqrt(3)
@@ -118,11 +121,13 @@ def newton_direction(points, slope, curvature):
 
 
 def dense_starts():
-    """24 points (ω, α + β, α/(α + β)): memory of every length, and trends with α = 0."""
+    """34 points (ω, α + β, α/(α + β)): memory of every length, and trends with α = 0, to ω at its bound."""
     points = [(1 - total, total, share) for total in (0.2, 0.5, 0.8, 0.93, 0.98) for share in (0.02, 0.1, 0.3, 0.8)]
     points.pop()  # α = .784
     for length, level in ((3, 0.7), (30, 1.3), (30, 0.7), (150, 1.4), (150, 0.6)):
         points.append((level * (1 - np.exp(-1 / length)), np.exp(-1 / length), 0.0))
+    points += [(1e-8, beta, 0.0) for beta in (0.9, 0.97, 0.99, 0.995, 0.999, 0.9999)]
+    points += [(slope, 1 - 1e-6, 0.0) for slope in (1e-4, 5e-4, 2e-3, 1e-2)]  # growth
     return np.array(points)
 
 
@@ -157,7 +162,7 @@ def log_likelihoods(r):
 
 
 def test_seldom_worse_than_a_dense_search(record_property):
-    # Expected: the best of 24 starts of the search above, which shares no code with the kernels.
+    # Expected: the best of 34 starts of the search above, which shares no code with the kernels.
     worse, columns = [], 0
     for name, r in kinds_of_windows(np.random.default_rng(1), EACH, SAMPLES).items():
         fit = garch.fit_garch_windows(r[None])
@@ -172,7 +177,7 @@ def test_seldom_worse_than_a_dense_search(record_property):
     shares = [float(np.mean(np.concatenate(worse) > limit)) for limit in (1e-6, 1e-3)]
     record_property("share worse by 1e-6 and by 1e-3 a sample", shares)
     print("all", shares)
-    assert shares[0] <= 0.015
+    assert shares[0] <= 0.005
     assert shares[1] <= 0.0005
 
 
@@ -312,6 +317,16 @@ def test_sizes_that_numbers_cannot_hold():
     fit = garch.fit_garch(r)
     assert list(fit.status[:2]) == [FAILED, FAILED]
     assert np.isfinite(fit.log_likelihood[2])
+
+
+def test_silence_after_an_outlier():
+    # Expected: the dense search. ω is at its bound, and h falls to 1e-8 of the mean square.
+    e = 0.12 * np.random.default_rng(5).standard_normal((120, 4))
+    for column, stop in zip(e.T, (30, 60, 90, 110), strict=True):
+        column[stop], column[stop + 1 :] = 1.0, 0.0
+    fit = garch.fit_garch(e)
+    assert np.sum(fit.omega / np.mean(e**2, axis=0) < 1e-7) >= 2
+    assert np.all(log_likelihoods(e) - fit.log_likelihood < 120e-6)
 
 
 def test_one_sample_that_dominates():

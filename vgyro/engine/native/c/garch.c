@@ -16,6 +16,7 @@ typedef struct {
 } columns_t;
 static const columns_t usual = {{0.12, 0.35, 0.65, 0.95}, {0, 0, 0, 0}};
 static const columns_t robust = {{1, 1, 0.5, 0.1}, {0.2, 0.6, -0.2, -0.1}};
+static const double quiet[3] = {1e-3, 0.5, 0.4}; /* all but silent after an outlier */
 
 /* What a row of the grid says of one series: the cost of its columns, and the sums that one step of scoring from the
    constant variance needs: h = 1 + αg + δd, y = e² - 1, g_t = y_{t-1} + βg_{t-1}, d_t = 1 + βd_{t-1}. */
@@ -35,7 +36,7 @@ static void add_trend(row_t *row, double beta, ptrdiff_t samples, double power, 
 
 /* Trends of the variance, α = 0: h_t = 1 + x·d_t, d_t = (1 - β^t)/(1 - β^T), for rows of 1/(1 - β) in lengths of the
    series. They are looked at in coarse bins of time, d at their middles: it is only to find where to begin. */
-#define BINS 32
+#define BINS 16
 static const double row_length[ROWS] = {0.1, 0.2, 0.4, 0.8, 1.6, 4, 12, INFINITY};
 typedef struct {
     double beta[ROWS], change[ROWS], least[ROWS]; /* 1 - β^T, and the least x */
@@ -113,14 +114,19 @@ static void add_optima(series_t *series, double (*x)[3], const double *cost, dou
             add_start(series, x[i], cost[i]);
 }
 
-/* Where the searches of a series begin; `shifted` are its rows with the robust columns, slope the best x of each trend. */
-static void choose(const row_t *rows, const row_t *shifted, const trends_t *trends, const v4 *slope, const v4 *slope_cost,
-                   int lane, ptrdiff_t samples, series_t *series) {
+/* Where the searches of one series of four begin; `shifted` are its rows with the robust columns, slope the best x of
+   each trend. */
+static void choose(const row_t *rows, const row_t *shifted, const trends_t *trends, const v4 *slope,
+                   const v4 *slope_cost, int lane, ptrdiff_t samples, series_t *series) {
     double x[ROWS][3], cost[ROWS];
     best_columns(rows, &usual, x, cost);
     add_optima(series, x, cost, 0.5);
     for (int i = 0; i < ROWS; i++) cost[i] = scored(&rows[i], row_beta[i], samples, x[i]);
     add_optima(series, x, cost, INFINITY);
+    if (cost[0] < cost[1]) /* a short memory: β = 0 and an optimum inside are easily taken for one */
+        add_start(series, x[2], cost[2]);
+    else if (cost[1] < cost[2])
+        add_start(series, x[0], cost[0]);
     for (int i = 0; i < ROWS; i++) {
         x[i][0] = (1 + slope[i][lane] / trends->change[i]) * (1 - trends->beta[i]);
         x[i][1] = 0;
@@ -131,6 +137,7 @@ static void choose(const row_t *rows, const row_t *shifted, const trends_t *tren
     if (series->outlier) {
         best_columns(shifted, &robust, x, cost);
         add_optima(series, x, cost, INFINITY);
+        add_start(series, quiet, 0.5);
     }
 }
 

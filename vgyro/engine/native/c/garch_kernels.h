@@ -9,7 +9,7 @@ VG_INLINE v4 VG(mantissa)(v4 x, m4 *power) {
 
 VG_INLINE double VG(log_of)(double mantissa, int64_t power) { return log(mantissa) + (double)power * M_LN2; }
 
-#define STEPS 3
+#define STEPS 2  /* of Newton's method for the size of a trend */
 #define BLOCK 16 /* samples between two looks at the exponent */
 
 /* Loads four series in lane order, in units of their mean squares; sets outcome, mean_square and largest_share. */
@@ -119,7 +119,7 @@ VG_INLINE void VG(row)(const v4 *square, ptrdiff_t samples, double beta, const c
     }
 }
 
-/* The best x of each trend, of four series, by three steps of Newton's method, and its cost. */
+/* The best x of each trend, of four series, by STEPS steps of Newton's method, and its cost. */
 static void VG(trend)(const v4 *square, ptrdiff_t samples, const trends_t *trends, v4 *x, v4 *cost) {
     const v4 one = v4_set(1), half = v4_set(0.5), quarter = v4_set(0.25), four = v4_set(4);
     v4 mean[BINS];
@@ -150,7 +150,6 @@ static void VG(trend)(const v4 *square, ptrdiff_t samples, const trends_t *trend
             v4 h = one + at * v4_set(trends->d[i][b]);
             sum += mean[b] / h - mean[b];
             product *= h;
-            if (b % BLOCK == BLOCK - 1) product = VG(mantissa)(product, &power);
         }
         product = VG(mantissa)(product, &power);
         x[i] = at;
@@ -183,7 +182,8 @@ VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x,
     const v4 one = v4_set(1), zero = v4_set(0), w = x[0], a = x[1], b = x[2];
     v4 h = w + a + b, u = one / h, product = one, sum = zero;
     v4 dl = one, da = zero, db = zero, dlb = zero, dab = zero, dbb = zero;
-    v4 g0 = zero, g1 = zero, g2 = zero, m0 = zero, m1 = zero, m2 = zero;
+    v4 g0 = zero, g1 = zero, g2 = zero;
+    v4 m00 = zero, m01 = zero, m02 = zero, m11 = zero, m12 = zero, m22 = zero;
     v4 c00 = zero, c01 = zero, c02 = zero, c11 = zero, c12 = zero, c22 = zero;
     v4 s00 = zero, s01 = zero, s02 = zero, s11 = zero, s12 = zero, s22 = zero;
     m4 power = {0, 0, 0, 0};
@@ -207,15 +207,18 @@ VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x,
                 s12 += dq * dr;
                 s22 += dr * dr;
             }
-            v4 pp = p * p, qq = q * q, rr = r * r, cp = c * p, cq = c * q, du = d * u;
-            m0 += pp;
-            m1 += qq;
-            m2 += rr;
+            v4 pp = p * p, pq = p * q, pr = p * r, qq = q * q, qr = q * r, rr = r * r, du = d * u;
+            m00 += pp;
+            m01 += pq;
+            m02 += pr;
+            m11 += qq;
+            m12 += qr;
+            m22 += rr;
             c00 += c * pp;
-            c01 += cp * q;
-            c02 += cp * r + du * dlb;
+            c01 += c * pq;
+            c02 += c * pr + du * dlb;
             c11 += c * qq;
-            c12 += cq * r + du * dab;
+            c12 += c * qr + du * dab;
             c22 += c * rr + du * dbb;
             dbb = (db + db) + b * dbb;
             dab = da + b * dab;
@@ -228,16 +231,14 @@ VG_INLINE void VG(derivatives)(const v4 *square, ptrdiff_t samples, const v4 *x,
         }
         product = VG(mantissa)(product, &power);
     }
-    const v4 slope[3] = {g0, g1, g2}, metric[3] = {m0, m1, m2}, curvature[6] = {c00, c01, c02, c11, c12, c22};
-    const v4 outer[6] = {s00, s01, s02, s11, s12, s22};
+    const v4 slope[3] = {g0, g1, g2}, curvature[6] = {c00, c01, c02, c11, c12, c22};
+    const v4 metric[6] = {m00, m01, m02, m11, m12, m22}, outer[6] = {s00, s01, s02, s11, s12, s22};
     const double half = 0.5 / (double)samples;
     for (int lane = 0; lane < VG_LANES; lane++) {
         out[lane].cost = half * (VG(log_of)(product[lane], power[lane]) + sum[lane]);
-        for (int i = 0; i < 3; i++) {
-            out[lane].slope[i] = half * slope[i][lane];
-            out[lane].metric[i] = half * metric[i][lane];
-        }
+        for (int i = 0; i < 3; i++) out[lane].slope[i] = half * slope[i][lane];
         for (int i = 0; i < 6; i++) {
+            out[lane].metric[i] = half * metric[i][lane];
             out[lane].curvature[i] = half * curvature[i][lane];
             out[lane].outer[i] = 0.5 * half * outer[i][lane];
         }

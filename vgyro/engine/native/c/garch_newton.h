@@ -15,14 +15,15 @@ enum { SEARCHING, ENDED };
 #define STALLED 1e-12  /* the same where the quadratic model had to be bent or damped */
 #define PASSES 100     /* at most, for one search */
 #define RADIUS 0.3     /* of the first step: about the relative change of h */
+#define FLOOR 1e-6     /* least diagonal of the metric */
 #define FLATTEST 1e-9  /* least curvature, in units of the metric */
 #define SAME 0.03      /* distance, in units of the metric, at which two optima may count as one */
 #define SAME_GAIN 0.1  /* its square, at most, as a share of the gain over the constant variance */
 
-/* cost, slope and curvature of ½·mean(log h + e²/h); metric: diagonal of its expected curvature;
+/* cost, slope and curvature of ½·mean(log h + e²/h); metric: its expected curvature;
    outer: mean of the outer product of the scores. Symmetric matrices as 00 01 02 11 12 22. */
 typedef struct {
-    double cost, slope[3], curvature[6], metric[3], outer[6];
+    double cost, slope[3], curvature[6], metric[6], outer[6];
 } point_t;
 
 /* x is the best point so far, `at` what was seen there; trial = x + step is the point that the search asks for.
@@ -73,7 +74,7 @@ static int free_directions(unsigned work, double z[3][3]) {
 /* p = the minimiser of q'p + ½p'Bp along the free directions; true where B is convex there. Where it is not, the share
    `bend` of the downward curvature counts as if it were upward, and at least a little of the metric. */
 static int descend(const double *b, const double *metric, double bend, const double *q, unsigned work, double *p) {
-    double z[3][3], m[3][3], y[3], bz[3];
+    double z[3][3], m[3][3], y[3], bz[3], mz[3];
     int n = free_directions(work, z), convex = 1;
     p[0] = p[1] = p[2] = 0;
     for (int i = 0; i < n; i++) {
@@ -82,8 +83,8 @@ static int descend(const double *b, const double *metric, double bend, const dou
         y[i] = -dot(z[i], q);
     }
     for (int i = 0; i < n; i++) {
-        double least = 0;
-        for (int j = 0; j < 3; j++) least += FLATTEST * metric[j] * z[i][j] * z[i][j];
+        times(metric, z[i], mz);
+        double least = FLATTEST * dot(z[i], mz);
         for (int j = 0; j < i; j++) {
             for (int k = 0; k < j; k++) m[i][j] -= m[i][k] * m[j][k] * m[k][k];
             m[i][j] /= m[j][j];
@@ -181,14 +182,11 @@ static void propose(newton_t *n, double omega_min, double most) {
     const double room[4] = {n->x[0] - omega_min, n->x[1], n->x[2], most - (n->x[1] + n->x[2])};
     double damping = 0, low = 0, high = INFINITY;
     for (int i = 0; i < 30; i++) {
-        double b[6], bent[3], size = 0;
-        memcpy(b, n->at.curvature, sizeof b);
-        b[0] += damping * metric[0];
-        b[3] += damping * metric[1];
-        b[5] += damping * metric[2];
+        double b[6], bent[3];
+        for (int j = 0; j < 6; j++) b[j] = n->at.curvature[j] + damping * metric[j];
         n->convex = bounded_step(b, metric, n->bend, n->at.slope, room, n->step, &n->active);
-        for (int j = 0; j < 3; j++) size += metric[j] * n->step[j] * n->step[j];
-        n->size = sqrt(size);
+        times(metric, n->step, bent);
+        n->size = sqrt(dot(n->step, bent));
         times(n->at.curvature, n->step, bent);
         n->predicted = -dot(n->at.slope, n->step) - 0.5 * dot(n->step, bent);
         n->exact = n->convex && damping == 0;
@@ -212,10 +210,10 @@ static void newton_begin(newton_t *n, const double *start) {
 
 /* Is the search about to end at an optimum that is known already? */
 static int is_near(const newton_t *n, const double *known, double cost) {
-    double away[3] = {0, known[1] - n->x[1], known[2] - n->x[2]}, distance = 0;
+    double away[3] = {0, known[1] - n->x[1], known[2] - n->x[2]}, along[3];
     away[0] = known[0] - n->x[0] + away[1] + away[2];
-    for (int i = 0; i < 3; i++) distance += n->at.metric[i] * away[i] * away[i];
-    return n->at.cost > cost && distance < fmin(SAME * SAME, SAME_GAIN * (0.5 - cost));
+    times(n->at.metric, away, along);
+    return n->at.cost > cost && dot(away, along) < fmin(SAME * SAME, SAME_GAIN * (0.5 - cost));
 }
 
 /* Takes the derivatives at n->trial and asks for the next trial; ENDED: n->x and n->at.cost are the optimum. */
@@ -225,7 +223,7 @@ static int newton_next(newton_t *n, const point_t *seen, double omega_min, doubl
     if (ratio > 1e-3) {
         memcpy(n->x, n->trial, sizeof n->x);
         n->at = *seen;
-        for (int i = 0; i < 3; i++) n->at.metric[i] += 1e-6;
+        n->at.metric[0] += FLOOR, n->at.metric[3] += FLOOR, n->at.metric[5] += FLOOR;
     }
     if (!(ratio > 0.25)) {
         n->radius = 0.25 * n->size;
