@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -20,9 +20,6 @@ import pyarrow.parquet as pq
 
 from vgyro.errors import DataError
 from vgyro.storage.schemas import SCHEMAS, units_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 METADATA_KEY = b"vgyro"
 ROW_GROUP = 1 << 18
@@ -229,11 +226,6 @@ def words(codes: np.ndarray, names: Sequence[str]) -> pa.DictionaryArray:
     kept = sorted({name for name, there in zip(names, occurring, strict=True) if there})
     places = np.array([kept.index(name) if there else 0 for name, there in zip(names, occurring, strict=True)])
     return pa.DictionaryArray.from_arrays(pa.array(places.astype(np.int32)[codes]), pa.array(kept, pa.string()))
-
-
-def read_frame(path: str | Path) -> pd.DataFrame:
-    """A table as a pandas data frame, for the long tables of figures."""
-    return pq.read_table(path).to_pandas()
 
 
 def write_json(path: str | Path, record: Mapping[str, Any]) -> None:

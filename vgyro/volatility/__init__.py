@@ -3,7 +3,7 @@
 from vgyro.engine.models import DccFit, GarchFit
 from vgyro.volatility.arch_lm import ArchLm, arch_lm, kurtosis
 from vgyro.volatility.dcc import Test, constant_correlation_test, dcc_correlation, fit_ccc, fit_dcc
-from vgyro.volatility.garch import fit_garch, garch_from_parameters, garch_variance
+from vgyro.volatility.garch import fit_garch, garch_variance
 from vgyro.volatility.rolling import WindowModels, WindowWeights, weights_of_windows
 from vgyro.volatility.series import Series, block_means, detrended, window_residuals
 from vgyro.volatility.stretches import Window, stretches, windows
@@ -25,7 +25,6 @@ __all__ = [
     "fit_ccc",
     "fit_dcc",
     "fit_garch",
-    "garch_from_parameters",
     "garch_variance",
     "kurtosis",
     "stretches",

@@ -42,15 +42,3 @@ def _two_dimensional(r: np.ndarray) -> np.ndarray:
     if len(r) == 0:
         raise TooShort("the series holds no sample", remedy="Give at least 50 samples")
     return r
-
-
-def garch_from_parameters(
-    r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray
-) -> GarchFit:
-    """A GarchFit from stored parameters: h_t and likelihood computed again, no standard errors.
-
-    r [T, N] must be the series that was fitted: the start of the recursion is its mean square.
-    """
-    variance = garch_variance(r, omega, alpha, beta)
-    likelihood = recursions.garch_log_likelihood(r, variance)
-    return GarchFit(omega, alpha, beta, np.full((r.shape[1], 3), np.nan), likelihood, variance, status)
