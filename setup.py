@@ -13,7 +13,7 @@ from setuptools import Extension, setup
 NATIVE = Path("vgyro/engine/native")
 # The same bits on every instruction set: no fused multiply-add, no reordering.
 FLAGS = ["-O3", "-std=gnu11", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi"]
-SANITIZE = ["-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+SANITIZE = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
 
 def extensions() -> list[Extension]:
