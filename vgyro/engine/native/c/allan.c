@@ -2,12 +2,6 @@
 
 #include "vg.h"
 
-VG_INLINE v4 allan_load(const double *from) {
-    v4 value;
-    memcpy(&value, from, sizeof value);
-    return value;
-}
-
 #define VG_KERNELS "allan_kernels.h"
 #include "each_isa.h"
 

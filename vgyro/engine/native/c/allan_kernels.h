@@ -1,12 +1,18 @@
 /* Included once for each instruction set (each_isa.h). The order of all additions is fixed here. */
 
+VG_INLINE v4 VG(allan_load)(const double *from) {
+    v4 value;
+    memcpy(&value, from, sizeof value);
+    return value;
+}
+
 static double VG(allan_sum)(const double *x0, size_t m, size_t count) {
     const double *x1 = x0 + m, *x2 = x1 + m;
     v4 even = v4_set(0), odd = v4_set(0);
     size_t k = 0;
     for (; k + 8 <= count; k += 8) {
-        v4 d = allan_load(x2 + k) - 2 * allan_load(x1 + k) + allan_load(x0 + k);
-        v4 e = allan_load(x2 + k + 4) - 2 * allan_load(x1 + k + 4) + allan_load(x0 + k + 4);
+        v4 d = VG(allan_load)(x2 + k) - 2 * VG(allan_load)(x1 + k) + VG(allan_load)(x0 + k);
+        v4 e = VG(allan_load)(x2 + k + 4) - 2 * VG(allan_load)(x1 + k + 4) + VG(allan_load)(x0 + k + 4);
         even += d * d;
         odd += e * e;
     }

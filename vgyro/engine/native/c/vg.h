@@ -15,12 +15,13 @@ typedef int64_t m4 __attribute__((vector_size(32)));
 
 #define VG_INLINE static inline __attribute__((always_inline, unused))
 
-VG_INLINE v4 v4_set(double x) { return (v4){x, x, x, x}; }
+/* Macros, so that they belong to the instruction set of the function that uses them. */
+#define v4_set(x) ({ const double vg_x = (x); (v4){vg_x, vg_x, vg_x, vg_x}; })
 /* mask ? yes : no, lane by lane; a mask is all ones or all zeros. */
-VG_INLINE v4 v4_select(m4 mask, v4 yes, v4 no) { return (v4)(((m4)yes & mask) | ((m4)no & ~mask)); }
-VG_INLINE v4 v4_max(v4 a, v4 b) { return v4_select(a > b, a, b); }
-VG_INLINE v4 v4_min(v4 a, v4 b) { return v4_select(a < b, a, b); }
-VG_INLINE int m4_any(m4 mask) { return (mask[0] | mask[1] | mask[2] | mask[3]) != 0; }
+#define v4_select(mask, yes, no) ({ const m4 vg_mask = (mask); (v4)(((m4)(yes) & vg_mask) | ((m4)(no) & ~vg_mask)); })
+#define v4_max(a, b) ({ const v4 vg_a = (a), vg_b = (b); v4_select(vg_a > vg_b, vg_a, vg_b); })
+#define v4_min(a, b) ({ const v4 vg_a = (a), vg_b = (b); v4_select(vg_a < vg_b, vg_a, vg_b); })
+#define m4_any(mask) ({ const m4 vg_any = (mask); (vg_any[0] | vg_any[1] | vg_any[2] | vg_any[3]) != 0; })
 
 /* Instruction sets that kernels are compiled for, from each_isa.h. The results have the same bits on all of them:
    no contraction to fused multiply-add, no reordering (see setup.py). */
