@@ -15,6 +15,7 @@ threads.
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -41,10 +42,10 @@ def __getattr__(name: str) -> ModuleType:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
         return import_module(f"{__name__}.{name}")
-    except ModuleNotFoundError as error:
-        if error.name != f"{__name__}._{name}":
+    except ImportError:
+        if find_spec(f"{__name__}._{name}") is not None:
             raise
         raise EngineError(
-            f"the native engine is not built: {error.name} is missing",
+            f"the native engine is not built: {__name__}._{name} is missing",
             remedy="run `make env`; it needs a C compiler (Debian: sudo apt-get install gcc libc6-dev python3-dev)",
         ) from None
