@@ -13,6 +13,7 @@ Definition = Literal["level", "demeaned", "difference", "residual"]
 Mode = Literal["in_sample", "causal"]
 CorrelationModel = Literal["dcc", "ccc"]
 Engine = Literal["native", "reference"]
+Curve = Literal["modified", "hadamard", "robust"]
 
 PARTIAL = "partial"
 
@@ -36,6 +37,17 @@ class RestOptions(StrictModel):
     min_duration_s: float = Field(5.0, gt=0, description="a shorter stretch is not counted as rest, s")
     guard_s: float = Field(0.5, ge=0, description="cut from both ends of each stretch, s")
     threshold: float = Field(4.0, gt=0, description="motion begins at this multiple of the quiet level")
+
+
+class CalibrationOptions(StrictModel):
+    """Rate-table tests, and what the temperature does."""
+
+    confidence: float = Field(0.95, gt=0.5, lt=1, description="confidence of every interval")
+    temperature: Literal["auto", "off"] = Field(
+        "auto", description="auto: compensate bias and scale where the recordings show a dependence; off: never"
+    )
+    settle_s: float = Field(1.0, ge=0, description="cut from the start of plateaus that are found in a log, s")
+    whole_turns: bool = Field(True, description="average whole turns of the table where a plateau holds one")
 
 
 class VolatilityOptions(StrictModel):
@@ -89,6 +101,17 @@ class MetricsOptions(StrictModel):
     welch_s: float = Field(100.0, gt=0, description="length of a Welch segment, s")
     bootstrap: int = Field(500, ge=50, description="replicates of the bootstrap intervals")
     seed: int = Field(20120207, ge=0, description="seed of the bootstrap")
+    curves: tuple[Curve, ...] = Field((), description="Allan deviations beside the overlapping one")
+    most_lost_s: float = Field(0.5, ge=0, description="a shorter loss of samples does not break an average, s")
+    outlier_threshold: float | None = Field(
+        8.0, ge=5, description="a single sample so many standard deviations off is an outlier; null: none is"
+    )
+    equal_bandwidth_hz: float | None = Field(
+        None, gt=0, description="bandwidth at which 1σ is compared, Hz; null: the narrowest of the methods"
+    )
+    injected_rate: float | None = Field(
+        0.05, description="constant rate added to recordings at rest for a second table, deg/s; null: no such table"
+    )
 
 
 class CrossCheckOptions(StrictModel):
@@ -107,6 +130,7 @@ class Analysis(StrictModel):
     )
     integrity: IntegrityOptions = IntegrityOptions()
     rest: RestOptions = RestOptions()
+    calibration: CalibrationOptions = CalibrationOptions()
     volatility: VolatilityOptions = VolatilityOptions()
     fusion: FusionOptions = FusionOptions()
     metrics: MetricsOptions = MetricsOptions()
