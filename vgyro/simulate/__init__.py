@@ -1,12 +1,13 @@
 """Boards with known truth ("twins"), down to the bytes of a dump and its damage. See docs/twins.md."""
 
+from vgyro.simulate.check import check_against_board
 from vgyro.simulate.closed_form import allan_minimum, expected_allan
 from vgyro.simulate.dump import Dump, dump_of
 from vgyro.simulate.encode import encode_frames
 from vgyro.simulate.line import Damage, damage
 from vgyro.simulate.manifest import dump_name, manifest_of, manifest_yaml, reference_name
 from vgyro.simulate.recording import Simulated, simulate_pieces, simulate_recording
-from vgyro.simulate.twin import GyroTruth, Twin, check_against_board, lasting, parse_twin, truth_of
+from vgyro.simulate.twin import GyroTruth, Twin, lasting, parse_twin, truth_of
 
 __all__ = [
     "Damage",

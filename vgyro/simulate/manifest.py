@@ -33,6 +33,8 @@ def manifest_of(twin: Twin) -> Manifest:
         "notes": twin.notes,
         "recordings": [_recording(recording) for recording in twin.recordings],
     }
+    if twin.latitude_deg is not None:
+        record["latitude_deg"] = twin.latitude_deg
     if twin.analysis is not None:
         record["analysis"] = twin.analysis.model_dump(mode="json", exclude_unset=True)
     return Manifest.model_validate(record, context={PARTIAL: True})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -27,8 +27,9 @@ from vgyro.simulate.noise import (
     unit_flicker,
 )
 from vgyro.simulate.rows import row_at
+from vgyro.simulate.transfer import Direction, Transfer, temperature_at, thermal_bias
 from vgyro.simulate.twin import GyroTruth, Twin, TwinRecording, pole_of, temperature_of, truth_of
-from vgyro.units import arw_deg_s_rt_hz, deg_s, rrw_deg_s_rt_s
+from vgyro.units import arw_deg_s_rt_hz, deg_s, earth_rate_deg_s, rrw_deg_s_rt_s
 
 MOTION, LINE, THERMOMETER, GYRO = range(4)
 WHITE, FLICKER, WALK, BURST = range(4)
@@ -156,9 +157,9 @@ class _Maker:
         self._white = [streams.of(GYRO, name, WHITE) for name in self._names]
         self._modulated = ModulatedWhite(self._rate_hz, _volatility(twin, truths))
         self._slow = _Slow(twin, truths, self._names, self.samples, self._rate_hz, streams)
-        self._coefficients = [truth.temperature_coefficient for truth in truths]
+        self._truths = truths
         self._thermal, self._thermometer = temperature_of(twin, self._spec), streams.of(THERMOMETER)
-        self._output = _Output(twin, board, self._spec, self._rate_hz)
+        self._output = _Output(twin, board, self._spec, self._rate_hz, truths)
         self._converter = Converter(board, [truth.scale_error for truth in truths], self._stretches)
 
     def end_of_piece(self, first: int) -> int:
@@ -175,11 +176,11 @@ class _Maker:
         faults = faults_of(self._stretches, len(self._names), time, first)
         unit = np.column_stack([generator.standard_normal(samples) for generator in self._white])
         white = self._modulated.next(unit)
-        temperature = thermal.start_c + thermal.rise_k * -np.expm1(-time / thermal.time_constant_s)
+        temperature = temperature_at(thermal, time)
         bias = self._slow.piece(first, stop)
-        bias += np.outer(temperature - thermal.reference_c, self._coefficients)
+        bias += thermal_bias(self._truths, temperature - thermal.reference_c)
         bias += faults.added_bias
-        rates = self._output.piece(reference, white, faults) + bias
+        rates = self._output.piece(reference, white, faults, temperature) + bias
         rates *= faults.gain
         shown = temperature + thermal.noise_k * self._thermometer.standard_normal(samples)
         white_sd = np.sqrt(self._rate_hz) * white.sd[white.block_index] * faults.noise_gain
@@ -239,19 +240,34 @@ class _Slow:
 
 
 class _Output:
-    """Rate and white noise behind the sensor's pole; only gyros on the axis that turns see the rate."""
+    """Rate and white noise behind the sensor's pole, and what the gyros make of the rate.
 
-    def __init__(self, twin: Twin, board: Board, spec: TwinRecording, rate_hz: float) -> None:
+    Gyros on the axis that turns see the rate, and that of the Earth where the latitude is known; the others see their
+    `cross_axis` of it.
+    """
+
+    def __init__(
+        self, twin: Twin, board: Board, spec: TwinRecording, rate_hz: float, truths: Sequence[GyroTruth]
+    ) -> None:
         axis = spec.axis or board.axes[0]
-        self._turning = np.array([gyro.axis == axis for gyro in board.gyros], dtype=float)
+        turning = [gyro.axis == axis for gyro in board.gyros]
+        self._seen = np.array([1.0 if on else truth.cross_axis for on, truth in zip(turning, truths, strict=True)])
+        self._earth = 0.0 if twin.latitude_deg is None else earth_rate_deg_s(twin.latitude_deg)
+        full_scale = [gyro.range_deg_s or 1.0 for gyro in board.gyros]
+        self._transfer = Transfer(truths, full_scale, temperature_of(twin, spec).reference_c)
+        self._direction = Direction()
         pole = pole_of(twin, spec)
         self._poles: tuple[Pole, Pole] | None = None
         if pole is not None:
             self._poles = pole_of_motion(pole, rate_hz), pole_of_noise(pole, rate_hz)
 
-    def piece(self, reference: np.ndarray, white: White, faults: Faults) -> np.ndarray:
+    def piece(self, reference: np.ndarray, white: White, faults: Faults, temperature: np.ndarray) -> np.ndarray:
         """The next piece, [T, N]."""
         noise = white.noise * faults.noise_gain + faults.burst
+        direction = self._direction.next(reference)
         if self._poles is not None:
             reference, noise = self._poles[0].next(reference), self._poles[1].next(noise)
-        return np.outer(reference, self._turning) + noise
+        rate = np.outer(reference + self._earth, self._seen)
+        if self._transfer.ideal:
+            return rate + noise
+        return rate + noise + self._transfer.error(rate, direction, temperature)

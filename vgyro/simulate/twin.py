@@ -6,13 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from vgyro.board import Board
 from vgyro.complaints import did_you_mean
 from vgyro.config import PARTIAL, Analysis, merge
 from vgyro.dataset import RESERVED, Kind
 from vgyro.errors import ConfigError
 from vgyro.units import arw_deg_rt_h
-from vgyro.validation import Problem, StrictModel, parse_model
+from vgyro.validation import StrictModel, parse_model
 
 EVERY_GYRO = "all"
 FaultKind = Literal["drift", "step", "burst", "noise", "scale", "stuck", "dropout"]
@@ -56,6 +55,13 @@ class GyroTruth(StrictModel):
     bias_deg_s: float = Field(0.0, description="constant bias, deg/s")
     scale_error: float = Field(0.0, gt=-0.5, lt=0.5, description="true sensitivity over nominal, minus 1")
     temperature_coefficient: float = Field(0.0, description="bias per kelvin above temperature.reference_c, deg/s/K")
+    temperature_quadratic: float = Field(0.0, description="the same, of the square, deg/s/K²")
+    temperature_cubic: float = Field(0.0, description="the same, of the cube, deg/s/K³")
+    scale_temperature_ppm_k: float = Field(0.0, description="sensitivity per kelvin above reference_c, ppm/K")
+    nonlinearity_ppm: float = Field(0.0, description="largest deviation of the cubic part, ppm of full scale")
+    asymmetry_ppm: float = Field(0.0, description="(S⁺ - S⁻) over mean sensitivity, ppm")
+    hysteresis_ppm: float = Field(0.0, description="width of the loop at zero rate, ppm of full scale")
+    cross_axis: float = Field(0.0, gt=-0.5, lt=0.5, description="share seen of a rate about another axis")
     garch: Garch | None = None
 
     @property
@@ -73,13 +79,26 @@ class GyroTruth(StrictModel):
 
 
 class TemperatureTruth(StrictModel):
-    """Self-heating: T(t) = start_c + rise_k · (1 - exp(-t / time_constant_s)), the same for every sensor."""
+    """T(t) = start_c + rise_k · (1 - exp(-t / time_constant_s)), the same for every sensor; the rise is self-heating.
+
+    points : a sweep of the chamber, (s, °C) each, straight in between, held at both ends; instead of start_c
+    """
 
     start_c: float = 25.0
+    points: tuple[tuple[float, float], ...] = ()
     rise_k: float = 0.0
     time_constant_s: float = Field(600.0, gt=0)
     noise_k: float = Field(0.0, ge=0, description="white noise of the thermometer, K per sample")
-    reference_c: float = Field(25.0, description="temperature at which the temperature coefficient adds nothing")
+    reference_c: float = Field(25.0, description="temperature at which the temperature coefficients add nothing")
+
+    @model_validator(mode="after")
+    def _sweep(self) -> TemperatureTruth:
+        if self.points and "start_c" in self.model_fields_set:
+            raise ValueError("start_c and points both set the chamber's temperature; leave one of them out")
+        times = [time for time, _ in self.points]
+        if times != sorted(set(times)) or len(times) == 1:
+            raise ValueError("points: at least two, (s, °C) each, in order of time")
+        return self
 
 
 class Fault(StrictModel):
@@ -218,6 +237,9 @@ class Twin(StrictModel):
     sensor_pole_hz: float | None = Field(None, gt=0, description="-3 dB frequency of a one-pole low-pass, Hz")
     temperature: TemperatureTruth = TemperatureTruth()
     line: LineDamage = LineDamage()
+    latitude_deg: float | None = Field(
+        None, ge=-90, le=90, description="the axis that turns is vertical; null: no Earth"
+    )
     recordings: tuple[TwinRecording, ...] = Field(min_length=1)
     analysis: Analysis | None = Field(None, description="keys of config.yaml's `analysis` for the manifest")
 
@@ -308,58 +330,3 @@ def temperature_of(twin: Twin, recording: TwinRecording) -> TemperatureTruth:
 def line_of(twin: Twin, recording: TwinRecording) -> LineDamage:
     """What the line does to this recording."""
     return recording.line or twin.line
-
-
-def check_against_board(twin: Twin, board: Board, source: str) -> list[Problem]:
-    """Mistakes that only show when twin and board are read together."""
-    names = [gyro.name for gyro in board.gyros]
-    problems = []
-
-    def known(gyro: str, key: str) -> None:
-        if gyro not in (*names, EVERY_GYRO):
-            problems.append(
-                Problem(source, 1, key, f"board {board.name!r} has no gyro {gyro!r}{did_you_mean(gyro, names)}")
-            )
-
-    for gyro in twin.gyros:
-        known(gyro, f"gyros.{gyro}")
-    for key, value in (("correlation", twin.correlation), ("slow_correlation", twin.slow_correlation)):
-        problem = _matrix_problem(value, len(names))
-        if problem:
-            problems.append(Problem(source, 1, key, problem))
-    for index, recording in enumerate(twin.recordings):
-        for gyro in recording.gyros:
-            known(gyro, f"recordings.{index}.gyros.{gyro}")
-        for number, fault in enumerate(recording.faults):
-            known(fault.gyro, f"recordings.{index}.faults.{number}.gyro")
-            if fault.start >= recording.duration:
-                message = f"begins at {fault.start} s, after the end of the recording at {recording.duration} s"
-                problems.append(Problem(source, 1, f"recordings.{index}.faults.{number}", message))
-        if recording.axis is not None and recording.axis not in board.axes:
-            problems.append(
-                Problem(
-                    source, 1, f"recordings.{index}.axis", f"{recording.axis!r} is not one of {', '.join(board.axes)}"
-                )
-            )
-        if recording.axis is None and len(board.axes) > 1 and not isinstance(recording.motion, Rest):
-            message = f"says no axis for its motion; the board has {', '.join(board.axes)}"
-            problems.append(Problem(source, 1, f"recordings.{index}", message))
-    return problems
-
-
-def _matrix_problem(value: float | tuple[tuple[float, ...], ...] | None, gyros: int) -> str | None:
-    import numpy as np
-
-    if value is None:
-        return None
-    if isinstance(value, float):
-        lowest = -1.0 / (gyros - 1) if gyros > 1 else -1.0
-        return None if value > lowest else f"{value:g} for every pair of {gyros} gyros must be above {lowest:g}"
-    if {len(row) for row in value} != {gyros} or len(value) != gyros:
-        return f"expected {gyros} rows of {gyros} numbers, one for each gyro of the board"
-    matrix = np.array(value)
-    if not np.array_equal(matrix, matrix.T) or not np.all(np.diag(matrix) == 1):
-        return "a correlation matrix is symmetric and has 1 on its diagonal"
-    if np.linalg.eigvalsh(matrix).min() <= 0:
-        return "not positive definite: no set of gyros can be correlated like this"
-    return None
