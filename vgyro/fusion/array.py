@@ -78,6 +78,12 @@ class ArrayRates:
         """Sample period T, s."""
         return 1.0 / self.rate_hz
 
+    def part(self, samples: slice) -> ArrayRates:
+        """Some of the samples, first to last - 1."""
+        weights = {key: one.part(samples) for key, one in self.weights.items()}
+        columns = {name: getattr(self, name)[samples] for name in ("rate", "segment", "at_rest")}
+        return replace(self, **columns, weights=weights)
+
     def stretches(self) -> list[slice]:
         """The gap-free stretches, in order."""
         borders = np.flatnonzero(np.diff(self.segment)) + 1
@@ -136,7 +142,7 @@ class Fused:
 
     rate               : array [T], deg/s
     weights            : array [N], or those of each sample; None where the method has none
-    dc_gain            : gain for a constant rate
+    dc_gain            : gain for a constant rate; NaN: this and the next three are not known, and are to be measured
     bandwidth_hz       : -3 dB bandwidth, Hz; NaN: not limited by the method
     noise_bandwidth_hz : noise-equivalent bandwidth, one-sided, Hz; NaN: not limited
     delay_s            : delay at low frequency, s
@@ -145,11 +151,16 @@ class Fused:
 
     rate: np.ndarray
     weights: np.ndarray | SampleWeights | None = None
-    dc_gain: float = 1.0
+    dc_gain: float = math.nan
     bandwidth_hz: float = math.nan
     noise_bandwidth_hz: float = math.nan
-    delay_s: float = 0.0
+    delay_s: float = math.nan
     note: str = ""
+
+    @classmethod
+    def undelayed(cls, rate: np.ndarray, weights: np.ndarray | SampleWeights | None = None, note: str = "") -> Fused:
+        """Of a method that passes a motion common to all gyros as it is: Σw = 1 at every sample, no memory of rates."""
+        return cls(rate, weights, dc_gain=1.0, delay_s=0.0, note=note)
 
 
 @dataclass(frozen=True)
@@ -160,6 +171,8 @@ class Method:
     needs  : what it takes beside the rates: "arw", "rrw" (of every gyro), "weights" (of vgyro.volatility)
     fuse   : (ArrayRates, FilterParameters) → Fused;  raises CannotRun, with the reason
     per_definition : it runs once for each definition of r_t
+    same_at_any_rate : definition ("" of a method without) → why a constant rate, added to all gyros, adds itself to the
+                       fused rate and changes nothing else. What is not in it is run again with such a rate
     """
 
     name: str
@@ -169,3 +182,4 @@ class Method:
     needs: tuple[str, ...]
     fuse: Callable[[ArrayRates, FilterParameters], Fused]
     per_definition: bool = False
+    same_at_any_rate: Mapping[str, str] = field(default_factory=dict)

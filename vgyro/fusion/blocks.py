@@ -44,6 +44,17 @@ class SampleWeights:
         """Weights [M, N] of all blocks."""
         return cls(block, lambda slices: (weights[blocks] for blocks in slices), weights.shape[1])
 
+    def part(self, samples: slice) -> SampleWeights:
+        """The weights of some of the samples, first to last - 1."""
+        block = self.block[samples]
+        inside = block[block >= 0]
+        first = int(inside[0]) if inside.size else 0
+
+        def rows(slices: list[slice]) -> Iterator[np.ndarray]:
+            return self.rows([slice(one.start + first, one.stop + first) for one in slices])
+
+        return SampleWeights(np.where(block >= 0, block - first, block), rows, self.gyros)
+
     def pieces(self) -> Iterator[np.ndarray]:
         """Weights [n, N] of the samples, piece by piece."""
         parts = list(cut(self.block))

@@ -12,6 +12,12 @@ LEVEL_IN_MOTION = (
 )
 DEMEANED_IN_MOTION = "in motion r_t holds the motion but for its mean; use the definition residual"
 DIFFERENCE_IN_MOTION = "in motion r_t holds the change of the rate over a step; use the definition residual"
+SAME_AT_ANY_RATE = {
+    "demeaned": "Σw = 1, and r_t is without the window's mean",
+    "difference": "Σw = 1, and r_t is a difference",
+    "residual": "Σw = 1, and r_t is without the array's own rate",
+}
+"""Why a constant rate leaves the weights of a definition as they are. `level` is not among them: r_t holds the rate."""
 WARNINGS = {"level": LEVEL_IN_MOTION, "demeaned": DEMEANED_IN_MOTION, "difference": DIFFERENCE_IN_MOTION}
 
 
@@ -32,7 +38,7 @@ def conditional(model: str, mode: str) -> Callable[[ArrayRates, FilterParameters
         if shape != array.rate.shape:
             raise CannotRun(f"weights {shape} do not fit the rates {array.rate.shape}")
         fused, equal = weights.combine(array.rate)
-        return Fused(fused, weights, note=_note(array, parameters, equal))
+        return Fused.undelayed(fused, weights, _note(array, parameters, equal))
 
     return fuse
 

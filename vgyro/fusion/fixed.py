@@ -13,7 +13,7 @@ from vgyro.fusion.blocks import PIECE, combined
 def average(array: ArrayRates, parameters: FilterParameters) -> Fused:  # noqa: ARG001
     """The mean of the gyros."""
     size = array.rate.shape[1]
-    return Fused(combined(array.rate, np.ones(size)) / size, np.full(size, 1.0 / size))
+    return Fused.undelayed(combined(array.rate, np.ones(size)) / size, np.full(size, 1.0 / size))
 
 
 def median(array: ArrayRates, parameters: FilterParameters) -> Fused:  # noqa: ARG001
@@ -23,7 +23,7 @@ def median(array: ArrayRates, parameters: FilterParameters) -> Fused:  # noqa: A
         ordered = sorted_columns(array.rate[start : start + PIECE])
         low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
         fused[start : start + PIECE] = np.add(low, high, dtype=float) / 2
-    return Fused(fused)
+    return Fused.undelayed(fused)
 
 
 def sorted_columns(rate: np.ndarray) -> list[np.ndarray]:
@@ -58,4 +58,4 @@ def _inverse_variance(array: ArrayRates, coefficient: np.ndarray, name: str) -> 
     # The largest is taken out first, so that the squares neither overflow nor vanish.
     inverse = (coefficient.max() / coefficient) ** 2
     weights = inverse / inverse.sum()
-    return Fused(combined(array.rate, weights), weights)
+    return Fused.undelayed(combined(array.rate, weights), weights)

@@ -174,7 +174,7 @@ def _fused(
     if equal > 0:
         few = f"fewer than {FEWEST_BLOCKS} blocks were known, or all their moments are the same"
         notes.append(f"equal weights for {equal:.1%} of the samples: {few}")
-    return Fused(fused, weights, note="; ".join(notes))
+    return Fused.undelayed(fused, weights, "; ".join(notes))
 
 
 def _inverse(moment: np.ndarray, number: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from vgyro.errors import ConfigError
 from vgyro.fusion import filters, fixed, moments
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused, Method
-from vgyro.fusion.conditional import conditional
+from vgyro.fusion.conditional import SAME_AT_ANY_RATE, conditional
 from vgyro.validation import did_you_mean
 
 LIU = "Liu et al. (2015), eq. 15-17"
@@ -24,28 +24,40 @@ def _conditional(model: str, mode: str, source: str) -> Method:
     """The entry of CCC or DCC weights; in-sample weights know the rest of their window."""
     title = f"{model.upper()} weights, {mode.replace('_', '-')}"
     causal = mode == "causal"
-    return Method(f"{model}_{mode}", title, source, causal, ("weights",), conditional(model, mode), per_definition=True)
+    return Method(
+        f"{model}_{mode}", title, source, causal, ("weights",), conditional(model, mode),
+        per_definition=True, same_at_any_rate=SAME_AT_ANY_RATE,
+    )  # fmt: skip
 
 
+_FIXED = {"": "Σw = 1, fixed weights"}
+_UNIT_GAIN = {"": "Σw = 1, fixed weights, DC gain 1"}
+_MEDIAN = {"": "the median moves with the gyros"}
+
+# fmt: off
 _ALL = (
-    Method("average", "Average", "baseline", True, (), fixed.average),
-    Method("median", "Median", "baseline", True, (), fixed.median),
-    Method("inverse_variance_arw", "Inverse variance, ARW", "w ∝ 1/N²", True, ("arw",), fixed.inverse_variance_arw),
-    Method("inverse_variance_rrw", "Inverse variance, RRW", "w ∝ 1/K²", True, ("rrw",), fixed.inverse_variance_rrw),
+    Method("average", "Average", "baseline", True, (), fixed.average, same_at_any_rate=_FIXED),
+    Method("median", "Median", "baseline", True, (), fixed.median, same_at_any_rate=_MEDIAN),
+    Method("inverse_variance_arw", "Inverse variance, ARW", "w ∝ 1/N²", True, ("arw",), fixed.inverse_variance_arw,
+           same_at_any_rate=_FIXED),
+    Method("inverse_variance_rrw", "Inverse variance, RRW", "w ∝ 1/K²", True, ("rrw",), fixed.inverse_variance_rrw,
+           same_at_any_rate=_FIXED),
     Method("rolling_moment", "Rolling second moment", "w ∝ 1/m²", True, (), moments.rolling_moment),
     Method("ewma_causal", "EWMA second moment, causal", "w ∝ 1/m²", True, (), moments.ewma_causal),
     Method("ewma_two_sided", "EWMA second moment, two-sided", "w ∝ 1/m²", False, (), moments.ewma_two_sided),
     Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), filters.jiang_markov),
-    Method(
-        "jiang_random_walk", "Jiang 2012, random walk", f"{JIANG}, 1/τ → 0", True, ("arw",), filters.jiang_random_walk
-    ),
-    Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), filters.xue_2012),
-    Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), filters.chang_2012),
+    Method("jiang_random_walk", "Jiang 2012, random walk", f"{JIANG}, 1/τ → 0", True, ("arw",),
+           filters.jiang_random_walk, same_at_any_rate=_UNIT_GAIN),
+    Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), filters.xue_2012,
+           same_at_any_rate=_UNIT_GAIN),
+    Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), filters.chang_2012,
+           same_at_any_rate=_UNIT_GAIN),
     _conditional("ccc", "in_sample", f"{LIU}, a = b = 0"),
     _conditional("ccc", "causal", f"{LIU}, a = b = 0, carried forward"),
     _conditional("dcc", "in_sample", LIU),
     _conditional("dcc", "causal", f"{LIU}, carried forward"),
 )
+# fmt: on
 
 METHODS: dict[str, Method] = {method.name: method for method in _ALL}
 
