@@ -1,5 +1,6 @@
 """Boards with known truth ("twins"), down to the bytes of a dump and its damage. See docs/twins.md."""
 
+from vgyro.simulate.calibration_truth import calibration_truth, repeatability_truth
 from vgyro.simulate.check import check_against_board
 from vgyro.simulate.closed_form import allan_minimum, expected_allan
 from vgyro.simulate.dump import Dump, dump_of
@@ -16,6 +17,7 @@ __all__ = [
     "Simulated",
     "Twin",
     "allan_minimum",
+    "calibration_truth",
     "check_against_board",
     "damage",
     "dump_name",
@@ -27,6 +29,7 @@ __all__ = [
     "manifest_yaml",
     "parse_twin",
     "reference_name",
+    "repeatability_truth",
     "simulate_pieces",
     "simulate_recording",
     "truth_of",

@@ -1,0 +1,114 @@
+"""What a perfect calibration of a twin would find: the figures of its noiseless transfer at the table's own rates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.board import Board, Gyro
+from vgyro.errors import DataError
+from vgyro.simulate.motion import plateaus_of
+from vgyro.simulate.transfer import Direction, Transfer, temperature_at, thermal_bias
+from vgyro.simulate.twin import Twin, TwinRecording, temperature_of, truth_of
+from vgyro.units import deg_h, earth_rate_deg_s, parts_per_million
+
+
+@dataclass(frozen=True)
+class TruePoints:
+    """Plateaus of one gyro, [P]: rate (the Earth's included) and output without noise, deg/s; counts; direction"""
+
+    rate: np.ndarray
+    output: np.ndarray
+    count: np.ndarray
+    direction: np.ndarray
+    full_scale: float
+
+
+def calibration_truth(twin: Twin, board: Board, recording: str) -> dict[str, dict[str, float]]:
+    """Gyro of the axis that turns → figure → true value, for one calibration recording.
+
+    scale (deg/s a count) and bias (counts): least-squares line of the counts over the rate. nonlinearity_full_scale,
+    _rms, _reading (ppm): residuals of that line, largest and r.m.s. over full scale, largest over the rate itself.
+    asymmetry (ppm): slopes of the lines through the rates ≥ 0 and ≤ 0, their difference over their mean. hysteresis
+    (ppm of full scale): largest output up minus down at one rate, sign kept (NaN if no rate is met both ways).
+    zero_shift (deg/h): last zero rate minus first. scale_temperature (ppm/K), bias_temperature (deg/h/K): slopes of
+    sensitivity and bias at reference_c. Flicker and random walk are noise here: they are left out.
+    raises : DataError for a recording that is not on a rate table
+    """
+    spec = twin.recording(recording)
+    axis = spec.axis or board.axes[0]
+    return {gyro.name: _figures(true_points(twin, spec, gyro), twin, spec, gyro) for gyro in board.array(axis)}
+
+
+def repeatability_truth(twin: Twin, board: Board, recordings: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Gyro → repeatability (ppm) and bias_repeatability (deg/h): s.d. over power cycles, n - 1 in the denominator."""
+    cycles = [calibration_truth(twin, board, name) for name in recordings]
+    found = {}
+    for gyro in cycles[0]:
+        sensitivity = np.array([1.0 / cycle[gyro]["scale"] for cycle in cycles])
+        bias = np.array([cycle[gyro]["bias"] * cycle[gyro]["scale"] for cycle in cycles])
+        found[gyro] = {
+            "repeatability": parts_per_million(float(sensitivity.std(ddof=1) / sensitivity.mean())),
+            "bias_repeatability": deg_h(float(bias.std(ddof=1))),
+        }
+    return found
+
+
+def true_points(twin: Twin, spec: TwinRecording, gyro: Gyro) -> TruePoints:
+    """The points that a calibration recording would give without noise.  raises : DataError"""
+    plateaus = plateaus_of(spec.motion)
+    if not plateaus:
+        raise DataError(f"recording {spec.name!r} of twin {twin.name!r} is not on a rate table")
+    truth, thermal = truth_of(twin, spec, gyro.name), temperature_of(twin, spec)
+    table = np.array([plateau.rate for plateau in plateaus])
+    temperature = temperature_at(thermal, np.array([(p.start + p.stop) / 2 for p in plateaus]))
+    direction = Direction().next(np.concatenate([[0.0], table]))[1:]
+    rate = table + (0.0 if twin.latitude_deg is None else earth_rate_deg_s(twin.latitude_deg))
+    full_scale = gyro.range_deg_s or float(np.abs(table).max())
+    error = Transfer([truth], [full_scale], thermal.reference_c).error(rate[:, None], direction, temperature)[:, 0]
+    bias = truth.bias_deg_s + thermal_bias([truth], temperature - thermal.reference_c)[:, 0]
+    count = gyro.bias + gyro.sign * (1.0 + truth.scale_error) * (rate + error + bias) / gyro.scale
+    return TruePoints(rate, rate + error + bias, count, direction, full_scale)
+
+
+def _figures(points: TruePoints, twin: Twin, spec: TwinRecording, gyro: Gyro) -> dict[str, float]:
+    slope, bias = np.polyfit(points.rate, points.count, 1)
+    residual = (points.count - bias - slope * points.rate) / slope
+    turning = np.abs(points.rate) > 0.5 * np.abs(np.diff(np.unique(points.rate))).min()
+    truth = truth_of(twin, spec, gyro.name)
+    ratios = {
+        "nonlinearity_full_scale": np.abs(residual).max() / points.full_scale,
+        "nonlinearity_reading": np.abs(residual[turning] / points.rate[turning]).max(),
+        "nonlinearity_rms": np.sqrt(np.mean(residual**2)) / points.full_scale,
+        "asymmetry": _asymmetry(points),
+        "hysteresis": _hysteresis(points) / points.full_scale,
+    }
+    zeros = points.output[~turning]
+    return {
+        "scale": gyro.sign / float(slope),
+        "bias": float(bias),
+        **{name: parts_per_million(float(ratio)) for name, ratio in ratios.items()},
+        "zero_shift": deg_h(float(zeros[-1] - zeros[0])) if zeros.size > 1 else float("nan"),
+        "scale_temperature": truth.scale_temperature_ppm_k,
+        "bias_temperature": deg_h(truth.temperature_coefficient),
+    }
+
+
+def _asymmetry(points: TruePoints) -> float:
+    # The Earth's rate shifts every point alike: a hundredth of a degree decides on which side zero is.
+    sides = (points.rate > -0.01, points.rate < 0.01)
+    plus, minus = (np.polyfit(points.rate[side], points.output[side], 1)[0] for side in sides)
+    return (plus - minus) / ((plus + minus) / 2)
+
+
+def _hysteresis(points: TruePoints) -> float:
+    """deg/s"""
+    largest = float("nan")
+    for rate in np.unique(points.rate):
+        up, down = (points.output[(points.rate == rate) & (points.direction == way)] for way in (1, -1))
+        if up.size and down.size:
+            width = float(up.mean() - down.mean())
+            largest = width if not abs(largest) > abs(width) else largest
+    return largest
