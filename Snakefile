@@ -20,7 +20,7 @@ wildcard_constraints:
     dataset="|".join(DATASETS) or "none",
     recording="[A-Za-z0-9][A-Za-z0-9_-]*",
     axis="[A-Za-z0-9_]+",
-    definition="level|demeaned|difference|residual",
+    definition="level|demeaned|difference|residual|moved",
     chunk=r"\d+-of-\d+",
     paper="|".join(PAPERS),
 

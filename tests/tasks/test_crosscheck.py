@@ -22,6 +22,7 @@ GYROS = ("g1", "g2", "g3")
 DEFINITIONS = ("difference", "level", "residual")
 RATE_HZ, SECONDS, WINDOW = 10.0, 400, 120
 TABLES = ("garch", "dcc", "arch_lm", "weights", "fits")
+OUTPUTS = {name: f"{name}.parquet" for name in ("fused", "methods", "moved")}
 NOTHING = Provenance({}, "", "")
 
 
@@ -74,7 +75,7 @@ def run_stages(folder: Path, engine: str) -> None:
         made = {table: f"{name}/{table}.parquet" for table in TABLES}
         volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, definition=name, engine=engine))
     inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "weights": []}
-    fuse.main(task_of(folder, inputs, {"fused": "fused.parquet", "methods": "methods.parquet"}, engine=engine))
+    fuse.main(task_of(folder, inputs, OUTPUTS, engine=engine))
     segment = read_columns(folder / "rates.parquet", ["segment"])["segment"]
     rows: dict[str, list[Any]] = {name: [] for name in ("series", "tau", "deviation", "low", "high", "edf")}
     for index, gyro in enumerate(GYROS):

@@ -19,6 +19,7 @@ GYROS = ("g1", "g2", "g3")
 RATE_HZ, SECONDS = 10.0, 400
 DEFINITIONS = ("level", "residual")
 ARW = (0.05, 0.05, 0.15)
+OUTPUTS = {name: f"{name}.parquet" for name in ("fused", "methods", "moved")}
 ANALYSIS = {
     "volatility": {"window": 120, "step": 40, "definitions": DEFINITIONS},
     "fusion": {"moment_window_s": 60},
@@ -73,9 +74,9 @@ def run_volatility(folder):
         volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, definition=definition))
 
 
-def fuse_in(folder, tables=(), read=True, **keywords):
-    inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "weights": list(tables)}
-    fuse.main(task_of(folder, inputs, {"fused": "fused.parquet", "methods": "methods.parquet"}, **keywords))
+def fuse_in(folder, tables=(), read=True, moved=(), **keywords):
+    inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "weights": list(tables), "moved": list(moved)}
+    fuse.main(task_of(folder, inputs, OUTPUTS, **keywords))
     return [read_columns(folder / name) for name in ("fused.parquet", "methods.parquet") if read]
 
 
@@ -172,7 +173,14 @@ def test_same_bytes_for_any_threads_and_instruction_set(analysed, tmp_path):
         command = [sys.executable, "-m", "vgyro.tasks.fuse", "--input", "rates", str(analysed / "rates.parquet")]
         command += ["--input", "noise", str(analysed / "noise.json"), "--input", "weights", *tables]
         command += ["--output", "fused", str(tmp_path / "f.parquet")]
-        command += ["--output", "methods", str(tmp_path / "m.parquet")]
+        command += [
+            "--output",
+            "methods",
+            str(tmp_path / "m.parquet"),
+            "--output",
+            "moved",
+            str(tmp_path / "c.parquet"),
+        ]
         subprocess.run([*command, "--options", json.dumps(task.options)], env=os.environ | extra, check=True)
         written.add((tmp_path / "f.parquet").read_bytes())
     assert len(written) == 1

@@ -87,16 +87,23 @@ def select(names: Sequence[str] | Literal["all"]) -> list[Method]:
 
 
 def run_methods(
-    array: ArrayRates, parameters: FilterParameters, methods: Sequence[Method], definitions: Sequence[str]
+    array: ArrayRates,
+    parameters: FilterParameters,
+    methods: Sequence[Method],
+    definitions: Sequence[str],
+    moved: bool = False,
 ) -> Iterator[Outcome]:
     """Run `methods`, those with weights once for each definition of r_t, one after the other.
 
     A method that cannot run, or whose rate is not finite, gives an Outcome without a rate and with the reason.
     An array of one gyro has nothing to fuse: no method runs.
+    moved : a constant rate was added; only what may answer to that is run
     """
     reason = _reason_against_all(array)
     for method in methods:
         for definition in definitions if method.per_definition else ("",):
+            if moved and definition in method.same_at_any_rate:
+                continue
             if reason:
                 yield Outcome(method, definition, "", None, reason)
             else:

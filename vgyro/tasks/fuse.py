@@ -3,42 +3,61 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
 from tempfile import TemporaryFile
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 
+from vgyro.dataset import AT_REST
 from vgyro.fusion import Outcome, run_methods, select
+from vgyro.fusion.response import measured_response
 from vgyro.storage.tables import ROW_GROUP, TableWriter, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.fusion_inputs import OpenArray, open_array
 
 TEXTS = ("method", "definition", "column", "title", "source")
 FIGURES = ("dc_gain", "bandwidth_hz", "noise_bandwidth_hz", "delay_s")
+Row = dict[str, Any]
 ONE_GYRO = "one gyro: there is nothing to fuse"
 
 
 def main(task: Task) -> None:
-    """Read one array's rates, run every chosen method, write fused.parquet and methods.parquet.
+    """Read one array's rates, run every chosen method, write fused.parquet, methods.parquet and moved.parquet.
 
-    An array of one gyro gives tables without a method, and a note in their metadata.
+    inputs  : as open_array
+    options : board, axis, kind, injected_rate, analysis.volatility, .fusion, .engine
+    moved.parquet is of the same recording with injected_rate added to every gyro, less that rate: of the methods that
+    answer to a constant rate. An array of one gyro gives tables without a method, and a note in their metadata.
     """
     opened = open_array(task)
-    extra = {}
+    extra = {"rate_hz": opened.rates.rate_hz}
+    note = {}
     if len(opened.gyros) == 1:
-        extra = {"note": ONE_GYRO}
+        note = {"note": ONE_GYRO}
         logging.info(ONE_GYRO)
-    rate = {"rate_hz": opened.rates.rate_hz}
-    task.output("fused").parent.mkdir(parents=True, exist_ok=True)
-    with TemporaryFile(dir=task.output("fused").parent) as file:
-        fused = Columns(file)
-        rows = [] if extra else run_all(opened, fused)
-        with TableWriter(task.output("fused"), "fused", task.provenance(), {**rate, **extra}) as writer:
-            for part in fused.pieces(opened.file.time, opened.rates.segment):
-                writer.append(part)
-    write_table(task.output("methods"), table_of(rows), "methods", task.provenance(), extra)
+    with kept_columns(task.output("fused")) as fused:
+        rows = [] if note else run_all(opened, fused)
+        write_columns(task, "fused", opened, fused, {**extra, **note})
+    why = why_not_moved(opened.injected_rate, task.options["kind"])
+    with kept_columns(task.output("moved")) as moved:
+        rows = run_moved(opened, rows, moved, why)
+        write_columns(
+            task, "moved", opened, moved, {**extra, "injected_rate": opened.injected_rate, "note": why, **note}
+        )
+    write_table(task.output("methods"), table_of(rows), "methods", task.provenance(), note)
+
+
+def why_not_moved(injected_rate: float | None, kind: str) -> str:
+    """Why no constant rate is added; "" where it is."""
+    if kind not in AT_REST:
+        return "the recording is not one at rest"
+    return "" if injected_rate is not None else "analysis.metrics.injected_rate is null"
 
 
 class Columns:
@@ -63,32 +82,90 @@ class Columns:
             yield columns
 
 
-def run_all(opened: OpenArray, fused: Columns) -> list[dict[str, object]]:
+@contextmanager
+def kept_columns(table: Path) -> Iterator[Columns]:
+    """Columns, in a file without a name beside the table that they are for."""
+    table.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryFile(dir=table.parent) as file:
+        yield Columns(file)
+
+
+def write_columns(task: Task, name: str, opened: OpenArray, columns: Columns, extra: Mapping[str, object]) -> None:
+    """Write the table `name`, an output of the same name."""
+    with TableWriter(task.output(name), name, task.provenance(), dict(extra)) as writer:
+        for part in columns.pieces(opened.file.time, opened.rates.segment):
+            writer.append(part)
+
+
+def run_all(opened: OpenArray, fused: Columns) -> list[Row]:
     """Run the chosen methods one after the other, keep their rates in `fused`, return the rows of methods.parquet."""
 
-    def keep(outcome: Outcome) -> dict[str, object]:
+    def keep(outcome: Outcome) -> Row:
         logging.info("%s: %s", outcome.column or outcome.method.name, outcome.note or "ok")
         if outcome.fused is not None:
             fused.add(outcome.column, outcome.fused.rate)
-        return describe(outcome)
+        return describe(outcome, opened)
 
     methods = select(opened.fusion.methods)
     # No outcome is held while the next one is made.
     return list(map(keep, run_methods(opened.rates, opened.parameters, methods, opened.volatility.definitions)))
 
 
-def describe(outcome: Outcome) -> dict[str, object]:
-    """A row of methods.parquet; figures are NaN where the method could not run."""
+def run_moved(opened: OpenArray, rows: list[Row], moved: Columns, why: str) -> list[Row]:
+    """Run what answers to a constant rate again, with one added; keep the errors in `moved`; fill in the rows.
+
+    The rates that are open hold the added rate afterwards.  why : nothing is added
+    """
+    methods = select(opened.fusion.methods)
+    same = {
+        (method.name, definition): f"the same at any constant rate: {reason}"
+        for method in methods
+        for definition, reason in method.same_at_any_rate.items()
+    }
+    if why or not rows:
+        found = dict.fromkeys(((row["method"], row["definition"]) for row in rows), f"not known: {why}")
+    else:
+        definitions = opened.volatility.definitions
+        outcomes = run_methods(opened.move(), opened.parameters, methods, definitions, moved=True)
+        found = dict(keep_error(outcome, opened.injected_rate or 0.0, moved) for outcome in outcomes)
+    said = {**found, **same}
+    return [{**row, "moved": said[row["method"], row["definition"]] if row["column"] else ""} for row in rows]
+
+
+def keep_error(outcome: Outcome, added: float, moved: Columns) -> tuple[tuple[str, str], str]:
+    """Keep the error of a fused rate; the method and definition, and its column or why there is none."""
+    key = (outcome.method.name, outcome.definition)
+    logging.info("%s at %g deg/s: %s", outcome.column or outcome.method.name, added, outcome.note or "ok")
+    if outcome.fused is None:
+        return key, f"not known: {outcome.note}"
+    error = outcome.fused.rate
+    error -= added
+    moved.add(outcome.column, error)
+    return key, outcome.column
+
+
+def describe(outcome: Outcome, opened: OpenArray) -> Row:
+    """A row of methods.parquet but for `moved`; figures are NaN where the method could not run."""
     method, fused = outcome.method, outcome.fused
     texts = (method.name, outcome.definition, outcome.column, method.title, method.source)
-    figures = {name: getattr(fused, name) if fused is not None else float("nan") for name in FIGURES}
-    return {**dict(zip(TEXTS, texts, strict=True)), "causal": method.causal, **figures, "note": outcome.note}
+    figures, how = dict.fromkeys(FIGURES, float("nan")), ""
+    if fused is not None:
+        known = isfinite(fused.dc_gain)
+        source = (
+            fused
+            if known
+            else measured_response(method.fuse, opened.rates, replace(opened.parameters, definition=outcome.definition))
+        )
+        figures, how = {name: getattr(source, name) for name in FIGURES}, "analytic" if known else "measured"
+    row = {**dict(zip(TEXTS, texts, strict=True)), "causal": method.causal, **figures}
+    return {**row, "response": how, "note": outcome.note}
 
 
-def table_of(rows: list[dict[str, object]]) -> pa.Table:
+def table_of(rows: list[Row]) -> pa.Table:
     """Rows → table; without rows, too, the columns have their types."""
     fields = [(name, pa.string()) for name in TEXTS] + [("causal", pa.bool_())]
-    fields += [(name, pa.float64()) for name in FIGURES] + [("note", pa.string())]
+    fields += [(name, pa.float64()) for name in FIGURES]
+    fields += [(name, pa.string()) for name in ("response", "moved", "note")]
     return pa.Table.from_pylist(rows, schema=pa.schema(fields))
 
 

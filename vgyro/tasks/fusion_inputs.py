@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -18,11 +19,17 @@ from vgyro.fusion.array import WeightKey
 from vgyro.storage.tables import ROW_GROUP, read_batches, read_json, read_metadata, read_rows
 from vgyro.tasks.common import Task
 from vgyro.tasks.rates_file import ArrayFile, read_array
+from vgyro.tasks.volatility_series import LEVEL, MOVED
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class OpenArray:
-    """One recording of one array, and how it is to be fused."""
+    """One recording of one array, and how it is to be fused.
+
+    injected_rate : constant rate that is added for a second run, deg/s; None: there is none
+    """
 
     gyros: list[str]
     file: ArrayFile
@@ -30,22 +37,42 @@ class OpenArray:
     parameters: FilterParameters
     fusion: FusionOptions
     volatility: VolatilityOptions
+    injected_rate: float | None = None
+
+    def move(self) -> ArrayRates:
+        """Add the injected rate to the rates, in their place, for they are large; the weights are those with it, too.
+
+        Rates in single precision are rounded by that, at 0.05 deg/s by 3e-8 deg/s at most where they are below 1 deg/s.
+        """
+        for column in self.rates.rate.T:
+            column += self.injected_rate
+        weights = _of_moved_level(self.rates.weights)
+        return replace(self.rates, weights=weights, no_weights=_of_moved_level(self.rates.no_weights))
+
+
+def _of_moved_level(known: Mapping[WeightKey, T]) -> dict[WeightKey, T]:
+    """What is known of the moved level, as that of the definition `level`."""
+    return {(model, mode, LEVEL): one for (model, mode, definition), one in known.items() if definition == MOVED}
 
 
 def open_array(task: Task) -> OpenArray:
-    """Read rates, noise and, where they are an input, the weights of one array."""
+    """Read rates, noise and, where they are an input, the weights of one array.
+
+    inputs : rates, noise, weights; moved, the weights of the level with the option injected_rate (may be left out)
+    """
     analysis = task.options["analysis"]
     fusion = FusionOptions.model_validate(analysis.get("fusion", {}))
     volatility = VolatilityOptions.model_validate(analysis.get("volatility", {}))
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     file = read_array(task.input("rates"), gyros, task.options["axis"])
+    tables = [*task.inputs.get("weights", []), *task.inputs.get("moved", [])]
     block_hz = file.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
-    weights, reasons = read_weights(task.inputs.get("weights", []), gyros, file, block_hz)
+    weights, reasons = read_weights(tables, gyros, file, block_hz)
     noise = read_noise(task.input("noise"), gyros)
     rates = ArrayRates(file.rate, file.rate_hz, file.segment, file.at_rest, noise, weights, reasons)
     moving = in_motion(task.options["kind"], file.at_rest)
     parameters = FilterParameters.of(fusion, moving, block_hz, analysis.get("engine", "native"))
-    return OpenArray(gyros, file, rates, parameters, fusion, volatility)
+    return OpenArray(gyros, file, rates, parameters, fusion, volatility, task.options.get("injected_rate"))
 
 
 def in_motion(kind: str, at_rest: np.ndarray) -> bool:

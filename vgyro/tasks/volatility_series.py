@@ -24,11 +24,16 @@ WHOLE = -1
 WHOLE_SAMPLES = 1_000_000
 """Of a longer stretch, that window is the first so many samples."""
 SLAB = 1 << 20
+LEVEL, MOVED = "level", "moved"
+"""`moved` is the level of the series with a constant rate added: no definition of its own, but made as one is."""
 
 
 @dataclass(frozen=True)
 class ArraySeries:
-    """One array's series, which stays in its file, and how it is analysed."""
+    """One array's series, which stays in its file, and how it is analysed.
+
+    added : constant rate that is added to every gyro, deg/s
+    """
 
     path: Path
     gyros: list[str]
@@ -37,6 +42,7 @@ class ArraySeries:
     options: VolatilityOptions
     definition: Definition
     engine: str
+    added: float = 0.0
 
     @property
     def samples(self) -> int:
@@ -70,7 +76,8 @@ class ArraySeries:
     def table(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         """Samples start to stop - 1, [stop - start, N] deg/s, and their time [stop - start], s."""
         found = read_rows(self.path, ["time", *self.gyros], start, stop)
-        return np.column_stack([found[gyro] for gyro in self.gyros]).astype(float, copy=False), found["time"]
+        values = np.column_stack([found[gyro] for gyro in self.gyros]).astype(float, copy=False)
+        return (values + self.added if self.added else values), found["time"]
 
     def residuals(self, number: int) -> np.ndarray:
         """r_t that the models of a window are fitted to, [T, N] deg/s."""
@@ -101,19 +108,22 @@ class Slab:
 def open_series(task: Task, name: str = "series") -> ArraySeries:
     """Where the series of one array is, from the input `name`.
 
-    options : board, axis, definition, analysis.engine, analysis.volatility
+    options : board, axis, definition, analysis.engine, analysis.volatility; of the definition `moved`, injected_rate
     raises  : ConfigError if the definition is not known
     """
     analysis = task.options["analysis"]
     options = VolatilityOptions.model_validate(analysis.get("volatility", {}))
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
-    definition = task.options["definition"]
+    definition, added = task.options["definition"], 0.0
+    if definition == MOVED:
+        definition, added = LEVEL, float(task.options["injected_rate"])
     if definition not in get_args(Definition):
         raise ConfigError(f"unknown definition {definition!r}", remedy=f"One of {', '.join(get_args(Definition))}")
     path = task.input(name)
     about = read_metadata(path)
     plan = rolling_windows([Window(start, stop) for start, stop, _ in about["runs"]], options.window, options.step)
-    return ArraySeries(path, gyros, about["rate_hz"], plan, options, definition, analysis.get("engine", "native"))
+    engine = analysis.get("engine", "native")
+    return ArraySeries(path, gyros, about["rate_hz"], plan, options, definition, engine, added)
 
 
 def stored_model(array: ArraySeries, garch_path: Path, dcc_path: Path, number: int) -> WindowModels:

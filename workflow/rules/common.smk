@@ -44,11 +44,18 @@ def analysis_of(dataset):
 
 
 def stage(*sections, **values):
-    """Options of a stage's jobs, as JSON: the sections that it uses, its wildcards, and what else is given."""
+    """Options of a stage's jobs, as JSON: the sections that it uses, its wildcards, and what else is given.
+
+    A function among what else is given is called with the wildcards.
+    """
 
     def options(wildcards):
         known = DATASETS[wildcards.dataset]
-        record = {**values, **dict(wildcards.items()), "analysis": {}}
+        given = {
+            name: value(wildcards) if callable(value) else value
+            for name, value in values.items()
+        }
+        record = {**given, **dict(wildcards.items()), "analysis": {}}
         if "recording" in record:
             record["kind"] = kind_of(wildcards.dataset, wildcards.recording)
         for section in sections:
@@ -182,6 +189,25 @@ def weights_of(wildcards):
         f"{folder}/{definition}/weights.parquet"
         for definition in definitions(wildcards.dataset)
     ]
+
+
+def injected_rate(wildcards):
+    """Constant rate that the job adds to every gyro, deg/s; None: none is added."""
+    added = analysis_of(wildcards.dataset).metrics.injected_rate
+    moved = wildcards.get("definition", "moved") == "moved"
+    at_rest = kind_of(wildcards.dataset, wildcards.recording) in AT_REST
+    return added if moved and at_rest else None
+
+
+def moved_weights_of(wildcards):
+    """Weights of the level with a constant rate added, for a recording at rest: those of `level` shrink toward zero."""
+    wanted = (
+        injected_rate(wildcards) is not None
+        and "level" in definitions(wildcards.dataset)
+        and has_volatility(wildcards.dataset, wildcards.recording)
+    )
+    folder = f"results/{wildcards.dataset}/{wildcards.recording}/{wildcards.axis}"
+    return [f"{folder}/moved/weights.parquet"] if wanted else []
 
 
 def tables_of(wildcards, table):

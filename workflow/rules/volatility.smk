@@ -41,7 +41,7 @@ rule volatility_chunk:
         mem_mb=1000,
         runtime=480,
     params:
-        options=stage("board", "engine", "volatility"),
+        options=stage("board", "engine", "volatility", injected_rate=injected_rate),
         code=code("volatility_chunk"),
     shell:
         "python -m vgyro.tasks.volatility_chunk --input series {input.series}"
@@ -70,7 +70,7 @@ rule volatility:
         mem_mb=1500,
         runtime=480,
     params:
-        options=stage("board", "engine", "volatility"),
+        options=stage("board", "engine", "volatility", injected_rate=injected_rate),
         code=code("volatility"),
     shell:
         "python -m vgyro.tasks.volatility --input series {input.series}"
