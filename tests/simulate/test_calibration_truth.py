@@ -15,6 +15,7 @@ from vgyro.simulate import (
     parse_twin,
     repeatability_truth,
     simulate_recording,
+    thermal_truth,
 )
 from vgyro.simulate.calibration_truth import true_points
 
@@ -34,13 +35,12 @@ def test_the_shipped_twin_holds_its_figures(shipped: Twin, dsp6: Board) -> None:
     truth = calibration_truth(shipped, dsp6, "cycle1")
     assert truth["g1"]["nonlinearity_full_scale"] == pytest.approx(120, abs=0.1)
     assert truth["g1"]["asymmetry"] == pytest.approx(300, abs=0.1)
-    assert truth["g1"]["hysteresis"] == pytest.approx(-60)
+    assert truth["g1"]["hysteresis"] == pytest.approx(60)
     assert truth["g1"]["scale_temperature"] == -400
     assert truth["g1"]["zero_shift"] == pytest.approx(-30e-6 * 300 * 3600)
     assert truth["g2"]["nonlinearity_full_scale"] == pytest.approx(0, abs=1e-6)
     assert truth["g3"]["nonlinearity_full_scale"] == pytest.approx(50, abs=0.1)
     assert truth["g4"]["nonlinearity_full_scale"] == pytest.approx(120, abs=0.1)
-    assert truth["g4"]["bias_temperature"] == pytest.approx(-0.004 * 3600)
     assert truth["g6"]["asymmetry"] == pytest.approx(-200, abs=0.1)
     for found in repeatability_truth(shipped, dsp6, ["cycle1", "cycle2", "cycle3"]).values():
         assert found == pytest.approx({"repeatability": 30, "bias_repeatability": 36}, rel=1e-3)
@@ -81,6 +81,20 @@ def test_a_straight_gyro_has_its_scale_and_bias(quiet: Callable[..., Twin], dsp6
     assert truth["scale"] == pytest.approx(LSB / 1.25)
     assert truth["bias"] == pytest.approx(2 * 1.25 / LSB)
     assert (truth["zero_shift"], truth["hysteresis"]) == pytest.approx((0, 0), abs=1e-6)
+
+
+def test_temperature_figures_of_a_recording(quiet: Callable[..., Twin], dsp6: Board) -> None:
+    # Closed forms: over an even sweep from -a to a the line through c1·x + c3·x³ has the slope c1 + 0.6·c3·a².
+    gyro = "{g1: {temperature_coefficient: 0.002, temperature_quadratic: 0.0001, temperature_cubic: 1.0e-05}}"
+    sweep = "temperature: {points: [[0, 5], [1000, 45]], reference_c: 25}"
+    twin = quiet("kind: thermal, duration_s: 1000", gyro, sweep)
+    found = thermal_truth(twin, dsp6, "run")
+    assert found["g1"]["bias_temperature"] == pytest.approx((0.002 + 0.6 * 1e-5 * 400) * 3600, rel=1e-4)
+    assert found["g2"]["bias_temperature"] == pytest.approx(0)
+    heated = quiet("kind: static, duration_s: 1000", gyro, "temperature: {start_c: 25, rise_k: 6}")
+    expected = (0.002 * 6 + 0.0001 * 36 + 1e-5 * 216) * 3600
+    assert thermal_truth(heated, dsp6, "run")["g1"]["self_heating"] == pytest.approx(expected)
+    assert np.isnan(thermal_truth(quiet("kind: static, duration_s: 10"), dsp6, "run")["g1"]["bias_temperature"])
 
 
 def test_only_a_rate_table_has_points(shipped: Twin, dsp6: Board) -> None:

@@ -1,6 +1,6 @@
 """Boards with known truth ("twins"), down to the bytes of a dump and its damage. See docs/twins.md."""
 
-from vgyro.simulate.calibration_truth import calibration_truth, repeatability_truth
+from vgyro.simulate.calibration_truth import calibration_truth, repeatability_truth, thermal_truth
 from vgyro.simulate.check import check_against_board
 from vgyro.simulate.closed_form import allan_minimum, expected_allan
 from vgyro.simulate.dump import Dump, dump_of
@@ -32,5 +32,6 @@ __all__ = [
     "repeatability_truth",
     "simulate_pieces",
     "simulate_recording",
+    "thermal_truth",
     "truth_of",
 ]

@@ -12,7 +12,9 @@ from vgyro.errors import DataError
 from vgyro.simulate.motion import plateaus_of
 from vgyro.simulate.transfer import Direction, Transfer, temperature_at, thermal_bias
 from vgyro.simulate.twin import Twin, TwinRecording, temperature_of, truth_of
-from vgyro.units import deg_h, earth_rate_deg_s, parts_per_million
+from vgyro.units import EARTH_RATE_DEG_H, deg_h, deg_s, earth_rate_deg_s, parts_per_million
+
+FAST = 0.1  # of full scale
 
 
 @dataclass(frozen=True)
@@ -30,11 +32,11 @@ def calibration_truth(twin: Twin, board: Board, recording: str) -> dict[str, dic
     """Gyro of the axis that turns → figure → true value, for one calibration recording.
 
     scale (deg/s a count) and bias (counts): least-squares line of the counts over the rate. nonlinearity_full_scale,
-    _rms, _reading (ppm): residuals of that line, largest and r.m.s. over full scale, largest over the rate itself.
-    asymmetry (ppm): slopes of the lines through the rates ≥ 0 and ≤ 0, their difference over their mean. hysteresis
-    (ppm of full scale): largest output up minus down at one rate, sign kept (NaN if no rate is met both ways).
-    zero_shift (deg/h): last zero rate minus first. scale_temperature (ppm/K), bias_temperature (deg/h/K): slopes of
-    sensitivity and bias at reference_c. Flicker and random walk are noise here: they are left out.
+    _rms, _reading (ppm): residuals of that line, largest and r.m.s. over full scale, largest over the rate itself from
+    a tenth of full scale on. asymmetry (ppm): slopes of the lines through the rates from 0 up and from 0 down, their
+    difference over their mean. hysteresis (ppm of full scale): largest |output reached from below - from above| at one
+    rate (NaN if none is met both ways). zero_shift (deg/h): last zero rate minus first. scale_temperature (ppm/K): of
+    the sensitivity, over that at reference_c. Flicker and random walk are noise here: they are left out.
     raises : DataError for a recording that is not on a rate table
     """
     spec = twin.recording(recording)
@@ -53,6 +55,25 @@ def repeatability_truth(twin: Twin, board: Board, recordings: Sequence[str]) -> 
             "repeatability": parts_per_million(float(sensitivity.std(ddof=1) / sensitivity.mean())),
             "bias_repeatability": deg_h(float(bias.std(ddof=1))),
         }
+    return found
+
+
+def thermal_truth(twin: Twin, board: Board, recording: str) -> dict[str, dict[str, float]]:
+    """Gyro → bias_temperature (deg/h/K) and self_heating (deg/h) of a recording.
+
+    Slope of the least-squares line through the bias over the temperatures of the recording, each second alike (NaN if
+    it does not change); bias once the self-heating has come to its end minus bias at the start.
+    """
+    spec = twin.recording(recording)
+    thermal = temperature_of(twin, spec)
+    above = temperature_at(thermal, np.arange(0.5, spec.duration)) - thermal.reference_c
+    found = {}
+    for gyro in board.gyros:
+        truths = [truth_of(twin, spec, gyro.name)]
+        begin = temperature_at(thermal, np.zeros(1)) - thermal.reference_c
+        cold, settled = thermal_bias(truths, np.append(begin, begin + thermal.rise_k))[:, 0]
+        slope = np.polyfit(above, thermal_bias(truths, above)[:, 0], 1)[0] if np.ptp(above) > 0 else np.nan
+        found[gyro.name] = {"bias_temperature": deg_h(float(slope)), "self_heating": deg_h(float(settled - cold))}
     return found
 
 
@@ -76,39 +97,42 @@ def true_points(twin: Twin, spec: TwinRecording, gyro: Gyro) -> TruePoints:
 def _figures(points: TruePoints, twin: Twin, spec: TwinRecording, gyro: Gyro) -> dict[str, float]:
     slope, bias = np.polyfit(points.rate, points.count, 1)
     residual = (points.count - bias - slope * points.rate) / slope
-    turning = np.abs(points.rate) > 0.5 * np.abs(np.diff(np.unique(points.rate))).min()
+    fast = np.abs(points.rate) >= FAST * points.full_scale
     truth = truth_of(twin, spec, gyro.name)
     ratios = {
         "nonlinearity_full_scale": np.abs(residual).max() / points.full_scale,
-        "nonlinearity_reading": np.abs(residual[turning] / points.rate[turning]).max(),
+        "nonlinearity_reading": np.abs(residual[fast] / points.rate[fast]).max(initial=0.0),
         "nonlinearity_rms": np.sqrt(np.mean(residual**2)) / points.full_scale,
         "asymmetry": _asymmetry(points),
         "hysteresis": _hysteresis(points) / points.full_scale,
     }
-    zeros = points.output[~turning]
+    zeros = points.output[_at_zero(points.rate)]
     return {
         "scale": gyro.sign / float(slope),
         "bias": float(bias),
         **{name: parts_per_million(float(ratio)) for name, ratio in ratios.items()},
         "zero_shift": deg_h(float(zeros[-1] - zeros[0])) if zeros.size > 1 else float("nan"),
         "scale_temperature": truth.scale_temperature_ppm_k,
-        "bias_temperature": deg_h(truth.temperature_coefficient),
     }
 
 
 def _asymmetry(points: TruePoints) -> float:
-    # The Earth's rate shifts every point alike: a hundredth of a degree decides on which side zero is.
-    sides = (points.rate > -0.01, points.rate < 0.01)
+    zero = _at_zero(points.rate)
+    sides = ((points.rate > 0) | zero, (points.rate < 0) | zero)
     plus, minus = (np.polyfit(points.rate[side], points.output[side], 1)[0] for side in sides)
     return (plus - minus) / ((plus + minus) / 2)
 
 
 def _hysteresis(points: TruePoints) -> float:
     """deg/s"""
-    largest = float("nan")
+    widths = []
     for rate in np.unique(points.rate):
         up, down = (points.output[(points.rate == rate) & (points.direction == way)] for way in (1, -1))
         if up.size and down.size:
-            width = float(up.mean() - down.mean())
-            largest = width if not abs(largest) > abs(width) else largest
-    return largest
+            widths.append(abs(float(up.mean() - down.mean())))
+    return max(widths, default=float("nan"))
+
+
+def _at_zero(rate: np.ndarray) -> np.ndarray:
+    """The table stands: what is left is the Earth's rate."""
+    return np.abs(rate) < 2 * deg_s(EARTH_RATE_DEG_H)
