@@ -1,25 +1,22 @@
-"""Angle random walk N, bias instability B and rate random walk K from an Allan curve, with intervals."""
+"""Noise coefficients N, B, K and, on evidence, Q and R from an Allan curve, with limits."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from itertools import product
 
 import numpy as np
 
 from vgyro.metrics.allan import AllanCurve
+from vgyro.metrics.allan_model import BASE, FREE, SHAPES, Curve, Model, fit, low_pass_factor
+from vgyro.metrics.coefficient_limits import Drawing, Limits, chance_of_gain
 
-TERMS = ("N", "B", "K")
-FLICKER = 2 * math.log(2) / math.pi
-PASSES = 12
-SETTLED = 1e-9  # relative change of the model from pass to pass
+__all__ = ["Coefficient", "NoiseCoefficients", "low_pass_factor", "model_deviation", "noise_coefficients"]
+
 FEWEST_POINTS = 6
-STEPS_OF_BISECTION = 10
 LARGEST_MISFIT = 5.0
-LOWEST_SHARE = 1e-6  # of the variance found: a model may not fall below it
+EVIDENCE = 0.01  # largest probability by chance at which Q or R is taken to exist
+LARGEST_SIGMAS, LARGEST_RELATIVE = 4.0, 0.01  # a variance agrees with the model within the larger of the two
 
 
 @dataclass(frozen=True)
@@ -31,12 +28,16 @@ class Coefficient:
     high: float
 
 
+UNKNOWN = Coefficient(math.nan, math.nan, math.nan)
+
+
 @dataclass(frozen=True)
 class NoiseCoefficients:
-    """N deg/s/√Hz (two-sided), B deg/s, K deg/s/√s; the fit used τ >= tau_from, s.
+    """N deg/s/√Hz (two-sided), B deg/s, K deg/s/√s, Q deg, R deg/s²; the fit used τ >= tau_from, s.
 
     misfit : Σ (σ² - model)²·edf/(2 model²) a point; far above 1: the model does not describe the curve, because of
              tones or other noise that is no power law; `reliable` is then False
+    Q, R   : value and low are 0 without evidence, high is the largest that could have escaped; NaN: not estimated
     """
 
     N: Coefficient
@@ -45,6 +46,8 @@ class NoiseCoefficients:
     tau_from: float
     misfit: float
     note: str = ""
+    Q: Coefficient = UNKNOWN
+    R: Coefficient = UNKNOWN
 
     @property
     def reliable(self) -> bool:
@@ -60,209 +63,118 @@ def noise_coefficients(
     seed: int = 0,
     confidence: float | None = None,
 ) -> NoiseCoefficients:
-    """Fit σ²(τ) = N²/τ + (2 ln2/π)B² + K²τ/3 by reweighted non-negative least squares, weight edf/2.
+    """Fit σ²(τ) = N²/τ + (2 ln2/π)B² + K²τ/3, with 3Q²/τ² and R²τ²/2 where the curve shows them.
 
-    curve        : of a rate in deg/s
+    curve        : of a rate in deg/s; Allan deviation, overlapping or robust
     bandwidth_hz : -3 dB bandwidth of a first-order low-pass that the series went through; its effect on the white term
                    is put into the model and τ < 2Tc is left out; None: not limited
     dc_gain      : gain of that filter for a constant rate; all coefficients are divided by it
-    replicates   : draws for the intervals;  seed : of the draws;  confidence : None takes that of the curve
+    replicates   : draws for limits and evidence;  seed : of the draws;  confidence : None takes that of the curve
     returns      : NoiseCoefficients, NaN with a note where the curve has fewer than 3 points
-    Without a bandwidth, where the shortest τ do not fit the rest, a term in 1/τ² of either sign is added (a low-pass of
-    the gyro itself makes -3TcN²/2τ², quantised output 3Q²/τ²), and the τ that still do not fit are left out.
-    The limits invert a test: a value is inside when fits to curves drawn with it (chi² of each edf, correlated between
-    the τ as the fitted spectrum implies, the other terms fitted again) straddle the value found. Where a fit without
-    the term would give as large a value by chance, low = 0.
+    raises       : ValueError for a modified or Hadamard deviation, whose terms have other shapes
+    Reweighted non-negative least squares on σ², weight edf/2. For N, B and K its scatter is that of an efficient
+    estimator (test_figures_to_reach.py). Q and R: chance_of_gain at most 0.01, and 6 points at least. Limits: Limits.
+    Without a bandwidth, where the shortest τ do not fit the rest, a term in 1/τ² of either sign is tried: negative is a
+    low-pass of the gyro itself (-3TcN²/2τ²), which hides any Q; the τ that still do not fit are left out.
+    Where Q cannot be told from a low-pass, its upper limit is what the curve has room for: 3Q²/τ² <= σ² at every τ.
     Model: IEEE Std 952-1997, annex C.  Low-pass: first-order Gauss-Markov rate, Tc = 1/(2π·bandwidth).
     """
-    confidence = curve.confidence if confidence is None else confidence
     constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
     used = np.isfinite(curve.deviation) & (curve.edf > 0) & (curve.tau >= 2 * constant)
-    if used.sum() < len(TERMS):
-        nothing = Coefficient(math.nan, math.nan, math.nan)
+    if used.sum() < len(BASE):
         note = "fewer than 3 points of the Allan curve"
-        return NoiseCoefficients(nothing, nothing, nothing, math.nan, math.nan, note)
-    tau, variance, edf = curve.tau[used], curve.deviation[used] ** 2, curve.edf[used]
-    if not variance.any():
+        return NoiseCoefficients(UNKNOWN, UNKNOWN, UNKNOWN, math.nan, math.nan, note)
+    whole = Curve(curve.tau[used], curve.deviation[used] ** 2, curve.edf[used])
+    if not whole.variance.any():
         zero = Coefficient(0.0, 0.0, 0.0)
-        return NoiseCoefficients(zero, zero, zero, float(tau[0]), 0.0, "the series is constant")
-    columns = _columns(tau, constant)
-    first = 0 if constant else _first_fitting(columns, variance, edf, tau)
+        return NoiseCoefficients(zero, zero, zero, float(whole.tau[0]), 0.0, "the series is constant", zero, zero)
+    drawing = Drawing(replicates, seed)
+    model, first = _describe(whole, constant, drawing)
+    fitted = whole.since(first)
+    squares = fit(model, fitted)
+    tail = (1 - (curve.confidence if confidence is None else confidence)) / 2
+    limits = Limits(model, fitted, squares, drawing.errors(model, squares, fitted.edf), tail)
+    found = {term: (float(squares[at]), *limits.of(term)) for at, term in enumerate(model.terms) if term != FREE}
+    for term in set("QR") - set(model.terms):
+        found[term] = 0.0, 0.0, _largest_unseen(term, limits, curve.high[used] ** 2, whole, identified=first == 0)
+    expected = model.at(squares, fitted.variance)
+    misfit = float(np.mean((fitted.variance - expected) ** 2 * fitted.edf / (2 * expected**2)))
+    result = {term: Coefficient(*(math.sqrt(value) / dc_gain for value in three)) for term, three in found.items()}
+    tau_from = float(fitted.tau[0])
+    note = _note(model, tau_from if first or constant else None, misfit)
+    return NoiseCoefficients(**result, tau_from=tau_from, misfit=misfit, note=note)
+
+
+def _describe(curve: Curve, constant: float, drawing: Drawing) -> tuple[Model, int]:
+    """The model that describes the curve from the first τ, of that index, on."""
+    model, first = _at_short_tau(curve, constant, drawing)
+    curve = curve.since(first)
+    if len(curve.tau) >= FEWEST_POINTS and chance_of_gain(model, "R", curve, drawing) <= EVIDENCE:
+        model = model.with_terms("R")
+    return model, first
+
+
+def _at_short_tau(curve: Curve, constant: float, drawing: Drawing) -> tuple[Model, int]:
+    base = Model(BASE, curve.tau, constant)
+    if constant or len(curve.tau) < FEWEST_POINTS:
+        return base, 0
+    first = start = _first_fitting(base, curve)
     if first:
-        columns = np.column_stack([columns, tau**-2])
-        first = _first_fitting(columns, variance, edf, tau)
-    tau, variance, edf, columns = tau[first:], variance[first:], edf[first:], columns[first:]
-    fitted = _fit(columns, variance, edf)
-    draws = _draws(tau, edf, fitted, replicates, seed)
-    tail = (1 - confidence) / 2
-    found = []
-    for term in range(len(TERMS)):
-        limits = _limits(columns, variance, edf, draws, term, fitted, tail)
-        found.append(Coefficient(*(math.sqrt(value) / dc_gain for value in (float(fitted[term]), *limits))))
-    model = np.maximum(columns @ fitted, LOWEST_SHARE * variance)
-    misfit = float(np.mean((variance - model) ** 2 * edf / (2 * model**2)))
-    N, B, K = found
-    note = _note(fitted, float(tau[0]), first > 0 or constant > 0, misfit)
-    return NoiseCoefficients(N, B, K, float(tau[0]), misfit, note)
+        low_passed = base.with_terms(FREE)
+        start = _first_fitting(low_passed, curve)
+        if fit(low_passed.since(start), curve.since(start))[-1] < 0:
+            return low_passed.since(start), start
+    base = base.since(start)
+    if chance_of_gain(base, "Q", curve.since(start), drawing) <= EVIDENCE:
+        return base.with_terms("Q"), start
+    return Model(BASE, curve.tau[first:]), first
 
 
-def _note(fitted: np.ndarray, tau: float, late: bool, misfit: float) -> str:
-    notes = [f"fitted from τ = {tau:.3g} s"] if late else []
-    if len(fitted) > len(TERMS):
-        kind = "the gyro's own low-pass" if fitted[-1] < 0 else "noise of the angle (quantisation, a tone)"
-        notes.append(f"with a term 1/τ² for {kind}")
-    if misfit > LARGEST_MISFIT:
-        notes.append(f"N + B + K does not describe this curve (misfit {misfit:.3g}): read the curve itself")
-    return ", ".join(notes)
-
-
-def model_deviation(tau: np.ndarray, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None) -> np.ndarray:
-    """Allan deviation of the fitted model at `tau` s, in deg/s."""
-    constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
-    squares = np.array([getattr(coefficients, term).value ** 2 for term in TERMS])
-    return np.sqrt(_columns(np.asarray(tau, dtype=float), constant) @ squares)
-
-
-def low_pass_factor(tau: np.ndarray, constant: float) -> np.ndarray:
-    """Allan variance of white noise after a first-order low-pass of time constant `constant` s, over that before."""
-    if constant == 0:
-        return np.ones_like(tau)
-    ratio = constant / tau
-    return 1 - ratio / 2 * (3 - 4 * np.exp(-1 / ratio) + np.exp(-2 / ratio))
-
-
-def _columns(tau: np.ndarray, constant: float) -> np.ndarray:
-    return np.column_stack([low_pass_factor(tau, constant) / tau, np.full_like(tau, FLICKER), tau / 3])
-
-
-def _solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray, terms: int) -> np.ndarray:
-    """Weighted least squares, the first `terms` unknowns not negative, the others free; targets [R, M] → [R, C].
-
-    Exact: every subset of the at most three bounded columns is tried, and the best admissible one taken.
-    """
-    scaled = columns * np.sqrt(weights)[:, None]
-    norm = np.sqrt((scaled * scaled).sum(axis=0))
-    scaled /= norm
-    chosen = _subsets(columns.shape[1], terms)
-    # A column that is not in a subset has the equation x = 0.
-    gram = (scaled.T @ scaled) * (chosen[:, :, None] & chosen[:, None, :])
-    gram[:, range(len(norm)), range(len(norm))] += ~chosen
-    right = ((targets * np.sqrt(weights)) @ scaled).T
-    values = np.linalg.solve(gram, right * chosen[:, :, None])
-    # The sum of squares falls by this much when the subset is fitted.
-    explained = (values * right).sum(axis=1)
-    explained[(values[:, :terms] < 0).any(axis=1)] = -np.inf
-    best = np.argmax(explained, axis=0)
-    return values[best, :, np.arange(len(targets))] / norm
-
-
-@cache
-def _subsets(number: int, terms: int) -> np.ndarray:
-    """All choices among the first `terms` of `number` columns, the others always chosen, [2^terms, number]."""
-    bits = np.array(list(product((False, True), repeat=terms))).reshape(2**terms, terms)
-    bits = bits[np.argsort(bits.sum(axis=1), kind="stable")]
-    return np.hstack([bits, np.ones((len(bits), number - terms), dtype=bool)])
-
-
-def _fit(
-    columns: np.ndarray, variance: np.ndarray, edf: np.ndarray, held: tuple[int, float] | None = None
-) -> np.ndarray:
-    """Squared coefficients [C]; weights from the model, not the data, or low points would pull it down."""
-    open_terms = [term for term in range(columns.shape[1]) if held is None or term != held[0]]
-    bounded = len(TERMS) - (held is not None)
-    known = columns[:, held[0]] * held[1] if held else np.zeros(len(variance))
-    scale = np.maximum(variance, np.max(variance) * 1e-12)
-    values = np.zeros(columns.shape[1])
-    if held:
-        values[held[0]] = held[1]
-    for _ in range(PASSES):
-        part = _solve(columns[:, open_terms], (variance - known)[None], edf / (2 * scale**2), bounded)[0]
-        values[open_terms] = part
-        following = np.maximum(columns @ values, LOWEST_SHARE * variance)
-        if (np.abs(following - scale) <= SETTLED * scale).all():
-            break
-        scale = following
-    return values
-
-
-def _first_fitting(columns: np.ndarray, variance: np.ndarray, edf: np.ndarray, tau: np.ndarray) -> int:
+def _first_fitting(model: Model, curve: Curve) -> int:
     """Index of the first τ that agrees with a fit to all longer τ, within 4 standard deviations or 1 % of variance."""
-    last = min(len(tau) - FEWEST_POINTS, int(np.searchsorted(tau, tau[-1] / 30)))
+    last = min(len(curve.tau) - FEWEST_POINTS, int(np.searchsorted(curve.tau, curve.tau[-1] / 30)))
     for first in range(max(last, 0)):
-        rest = slice(first + 1, None)
-        model = columns[first] @ _fit(columns[rest], variance[rest], edf[rest])
-        if abs(variance[first] / model - 1) < max(4 * math.sqrt(2 / edf[first]), 0.01):
+        rest = first + 1
+        expected = model.columns[first] @ fit(model.since(rest), curve.since(rest))
+        allowed = max(LARGEST_SIGMAS * math.sqrt(2 / curve.edf[first]), LARGEST_RELATIVE)
+        if abs(curve.variance[first] / expected - 1) < allowed:
             return first
     return max(last, 0)
 
 
-def _draws(tau: np.ndarray, edf: np.ndarray, squares: np.ndarray, replicates: int, seed: int) -> np.ndarray:
-    """Relative errors [R, M] of an Allan curve: chi² of each edf, joined by a Gaussian copula."""
-    from scipy.special import chdtri, ndtr
+def _largest_unseen(term: str, limits: Limits, highest: np.ndarray, whole: Curve, identified: bool) -> float:
+    """Upper limit of the square of a term that is not in the model.
 
-    correlation = _correlation(tau, squares)
-    values, vectors = np.linalg.eigh(correlation)
-    root = vectors * np.sqrt(np.maximum(values, 0))
-    normal = np.random.default_rng(seed).standard_normal((replicates, len(tau))) @ root.T
-    return chdtri(edf, ndtr(-normal)) / edf
-
-
-def _correlation(tau: np.ndarray, squares: np.ndarray) -> np.ndarray:
-    """Correlation of Allan variances at different τ: ∫ S²|H₁|²|H₂|² df, S the fitted two-sided spectrum.
-
-    The covariance of two mean squares of stationary Gaussian series is 2/T times the integral of their squared
-    cross-spectrum (Parseval); the lengths cancel in the correlation.
+    highest : array [M], upper limits of the variances of the whole curve, which the term alone cannot exceed
     """
-    frequency = np.geomspace(1 / (30 * tau[-1]), 4 / tau[0], 64 * int(np.ceil(np.log2(120 * tau[-1] / tau[0]))))
-    angular = 2 * np.pi * frequency
-    spectrum = squares[0] + squares[1] / angular + squares[2] / angular**2
-    phase = np.pi * frequency * tau[:, None]
-    response = 2 * np.sin(phase) ** 4 / phase**2 * spectrum * np.sqrt(frequency)
-    response /= np.linalg.norm(response, axis=1, keepdims=True)
-    return response @ response.T
+    room = float(np.min(highest / SHAPES[term](whole.tau)))
+    model = limits.model
+    hidden = term == "Q" and (not identified or model.constant > 0 or FREE in model.terms)
+    if hidden or len(limits.curve.tau) < FEWEST_POINTS:
+        return room
+    wide = model.with_terms(term)
+    wider = Limits(wide, limits.curve, fit(wide, limits.curve), limits.errors, limits.tail)
+    return min(wider.upper(term), room)
 
 
-def _limits(
-    columns: np.ndarray,
-    variance: np.ndarray,
-    edf: np.ndarray,
-    draws: np.ndarray,
-    term: int,
-    fitted: np.ndarray,
-    tail: float,
-) -> tuple[float, float]:
-    found = float(fitted[term])
-
-    def share_below(value: float) -> float:
-        model = np.maximum(columns @ _fit(columns, variance, edf, (term, value)), LOWEST_SHARE * variance)
-        drawn = _solve(columns, draws * model, edf / (2 * model**2), len(TERMS))[:, term]
-        # A value found at zero is shared with all draws at zero; half of the ties count.
-        return float(np.mean(drawn < found) + np.mean(drawn == found) / 2) if found > 0 else float(np.mean(drawn <= 0))
-
-    start = found if found > 0 else _unit(columns, variance, term)
-    high = _crossing(share_below, start, tail, up=True)
-    if found == 0 or 1 - share_below(0.0) > tail:
-        return 0.0, high
-    return _crossing(share_below, start, 1 - tail, up=False), high
+def _note(model: Model, late: float | None, misfit: float) -> str:
+    notes = [] if late is None else [f"fitted from τ = {late:.3g} s"]
+    if FREE in model.terms:
+        notes.append("with a term 1/τ² for the gyro's own low-pass")
+    if "Q" in model.terms:
+        notes.append("with a term 1/τ² for noise of the angle (quantisation, a tone)")
+    if "R" in model.terms:
+        notes.append("with a term τ² for a ramp of the rate")
+    if misfit > LARGEST_MISFIT:
+        names = " + ".join(model.terms.rstrip(FREE))
+        notes.append(f"{names} does not describe this curve (misfit {misfit:.3g}): read the curve itself")
+    return ", ".join(notes)
 
 
-def _unit(columns: np.ndarray, variance: np.ndarray, term: int) -> float:
-    """A value of the coefficient that would by itself make a hundredth of the lowest variance."""
-    return float(0.01 * np.min(variance / columns[:, term]))
-
-
-def _crossing(share_below: Callable[[float], float], start: float, level: float, up: bool) -> float:
-    """The value at which the share of draws below the value found falls through `level`."""
-    step, near, far = 0.01, start, start
-    for _ in range(30):
-        far = near * (1 + step) if up else near / (1 + step)
-        if (share_below(far) < level) == up:
-            break
-        near, step = far, 2 * step
-    for _ in range(STEPS_OF_BISECTION):
-        middle = math.sqrt(near * far)
-        if (share_below(middle) < level) == up:
-            far = middle
-        else:
-            near = middle
-    return math.sqrt(near * far)
+def model_deviation(tau: np.ndarray, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None) -> np.ndarray:
+    """Allan deviation of the fitted model at `tau` s, in deg/s; terms that were not estimated are left out."""
+    constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
+    model = Model(BASE + "QR", np.asarray(tau, dtype=float), constant)
+    squares = np.array([getattr(coefficients, term).value ** 2 for term in model.terms])
+    squares[len(BASE) :] = np.nan_to_num(squares[len(BASE) :])
+    return np.sqrt(model.columns @ squares)
