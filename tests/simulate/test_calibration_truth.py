@@ -41,6 +41,8 @@ def test_the_shipped_twin_holds_its_figures(shipped: Twin, dsp6: Board) -> None:
     assert truth["g2"]["nonlinearity_full_scale"] == pytest.approx(0, abs=1e-6)
     assert truth["g3"]["nonlinearity_full_scale"] == pytest.approx(50, abs=0.1)
     assert truth["g4"]["nonlinearity_full_scale"] == pytest.approx(120, abs=0.1)
+    assert truth["g5"]["hysteresis"] == pytest.approx(150)
+    assert truth["g5"]["nonlinearity_full_scale"] == pytest.approx(0, abs=1e-6)
     assert truth["g6"]["asymmetry"] == pytest.approx(-200, abs=0.1)
     for found in repeatability_truth(shipped, dsp6, ["cycle1", "cycle2", "cycle3"]).values():
         assert found == pytest.approx({"repeatability": 30, "bias_repeatability": 36}, rel=1e-3)

@@ -19,11 +19,16 @@ FAST = 0.1  # of full scale
 
 @dataclass(frozen=True)
 class TruePoints:
-    """Plateaus of one gyro, [P]: rate (the Earth's included) and output without noise, deg/s; counts; direction"""
+    """Plateaus of one gyro, [P].
+
+    rate : deg/s, the Earth's included;  output : without noise, deg/s, in counts `count`;  between : the same, half-way
+    between the branches of the hysteresis, deg/s;  direction : 1 reached from below, -1 from above, 0 never changed
+    """
 
     rate: np.ndarray
     output: np.ndarray
     count: np.ndarray
+    between: np.ndarray
     direction: np.ndarray
     full_scale: float
 
@@ -31,9 +36,9 @@ class TruePoints:
 def calibration_truth(twin: Twin, board: Board, recording: str) -> dict[str, dict[str, float]]:
     """Gyro of the axis that turns → figure → true value, for one calibration recording.
 
-    scale (deg/s a count) and bias (counts): least-squares line of the counts over the rate. nonlinearity_full_scale,
-    _rms, _reading (ppm): residuals of that line, largest and r.m.s. over full scale, largest over the rate itself from
-    a tenth of full scale on. asymmetry (ppm): slopes of the lines through the rates from 0 up and from 0 down, their
+    scale (deg/s a count) and bias (counts): least-squares line of the counts over the rate, between the branches of
+    the hysteresis. nonlinearity_full_scale, _rms, _reading (ppm): residuals of that line, largest and r.m.s. over full
+    scale, largest over the rate itself from a tenth of full scale on. asymmetry (ppm): slopes of the lines through the rates from 0 up and from 0 down, their
     difference over their mean. hysteresis (ppm of full scale): largest |output reached from below - from above| at one
     rate (NaN if none is met both ways). zero_shift (deg/h): last zero rate minus first. scale_temperature (ppm/K): of
     the sensitivity, over that at reference_c. Flicker and random walk are noise here: they are left out.
@@ -88,15 +93,16 @@ def true_points(twin: Twin, spec: TwinRecording, gyro: Gyro) -> TruePoints:
     direction = Direction().next(np.concatenate([[0.0], table]))[1:]
     rate = table + (0.0 if twin.latitude_deg is None else earth_rate_deg_s(twin.latitude_deg))
     full_scale = gyro.range_deg_s or float(np.abs(table).max())
-    error = Transfer([truth], [full_scale], thermal.reference_c).error(rate[:, None], direction, temperature)[:, 0]
+    transfer = Transfer([truth], [full_scale], thermal.reference_c)
+    error, straight = (transfer.error(rate[:, None], way, temperature)[:, 0] for way in (direction, 0 * direction))
     bias = truth.bias_deg_s + thermal_bias([truth], temperature - thermal.reference_c)[:, 0]
     count = gyro.bias + gyro.sign * (1.0 + truth.scale_error) * (rate + error + bias) / gyro.scale
-    return TruePoints(rate, rate + error + bias, count, direction, full_scale)
+    return TruePoints(rate, rate + error + bias, count, rate + straight + bias, direction, full_scale)
 
 
 def _figures(points: TruePoints, twin: Twin, spec: TwinRecording, gyro: Gyro) -> dict[str, float]:
-    slope, bias = np.polyfit(points.rate, points.count, 1)
-    residual = (points.count - bias - slope * points.rate) / slope
+    slope, offset = np.polyfit(points.rate, points.between, 1)
+    residual = points.between / slope - points.rate - offset / slope
     fast = np.abs(points.rate) >= FAST * points.full_scale
     truth = truth_of(twin, spec, gyro.name)
     ratios = {
@@ -108,8 +114,8 @@ def _figures(points: TruePoints, twin: Twin, spec: TwinRecording, gyro: Gyro) ->
     }
     zeros = points.output[_at_zero(points.rate)]
     return {
-        "scale": gyro.sign / float(slope),
-        "bias": float(bias),
+        "scale": gyro.scale / ((1.0 + truth.scale_error) * float(slope)),
+        "bias": gyro.bias + gyro.sign * (1.0 + truth.scale_error) * float(offset) / gyro.scale,
         **{name: parts_per_million(float(ratio)) for name, ratio in ratios.items()},
         "zero_shift": deg_h(float(zeros[-1] - zeros[0])) if zeros.size > 1 else float("nan"),
         "scale_temperature": truth.scale_temperature_ppm_k,
@@ -119,7 +125,7 @@ def _figures(points: TruePoints, twin: Twin, spec: TwinRecording, gyro: Gyro) ->
 def _asymmetry(points: TruePoints) -> float:
     zero = _at_zero(points.rate)
     sides = ((points.rate > 0) | zero, (points.rate < 0) | zero)
-    plus, minus = (np.polyfit(points.rate[side], points.output[side], 1)[0] for side in sides)
+    plus, minus = (np.polyfit(points.rate[side], points.between[side], 1)[0] for side in sides)
     return (plus - minus) / ((plus + minus) / 2)
 
 
