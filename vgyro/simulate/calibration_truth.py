@@ -38,10 +38,11 @@ def calibration_truth(twin: Twin, board: Board, recording: str) -> dict[str, dic
 
     scale (deg/s a count) and bias (counts): least-squares line of the counts over the rate, between the branches of
     the hysteresis. nonlinearity_full_scale, _rms, _reading (ppm): residuals of that line, largest and r.m.s. over full
-    scale, largest over the rate itself from a tenth of full scale on. asymmetry (ppm): slopes of the lines through the rates from 0 up and from 0 down, their
-    difference over their mean. hysteresis (ppm of full scale): largest |output reached from below - from above| at one
-    rate (NaN if none is met both ways). zero_shift (deg/h): last zero rate minus first. scale_temperature (ppm/K): of
-    the sensitivity, over that at reference_c. Flicker and random walk are noise here: they are left out.
+    scale, largest over the rate itself from a tenth of full scale on. asymmetry (ppm): slopes of the lines through the
+    rates from 0 up and from 0 down, their difference over their mean. hysteresis (ppm of full scale): largest
+    |output reached from below - from above| at one rate (NaN if none is met both ways). zero_shift (deg/h): last zero
+    rate minus first. scale_temperature (ppm/K): of the sensitivity, over that at reference_c. Flicker and random walk
+    are noise here: they are left out.
     raises : DataError for a recording that is not on a rate table
     """
     spec = twin.recording(recording)
