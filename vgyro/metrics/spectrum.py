@@ -43,17 +43,19 @@ def spectral_density(
 ) -> Spectrum:
     """Amplitude density of a series by Welch's method, ONE-sided (√2 times the two-sided one).
 
-    rate    : array [T], deg/s;  welch_s : length of a Welch segment, s; cut to the longest gap-free stretch
+    rate    : array [T], deg/s;  welch_s : length of a Welch segment, s; cut to what half of the samples have: the length
+              of their gap-free stretch, or more
     segment : array [T] int, number of the gap-free stretch; power is averaged over the stretches that are long enough
     returns : Spectrum; empty if no stretch has 8 samples
     Hann window, half overlap, each Welch segment's mean removed.  Welch (1967), IEEE Trans. Audio Electroacoust. 15(2).
     """
     rate = np.asarray(rate, dtype=float)
     edges = edges_of(len(rate), segment)
-    longest = int(np.diff(edges).max(initial=0))
-    if longest < FEWEST_SAMPLES:
+    lengths = np.sort(np.diff(edges))
+    if lengths.max(initial=0) < FEWEST_SAMPLES:
         return Spectrum(np.empty(0), np.empty(0), 0)
-    length = min(max(round(welch_s * rate_hz), FEWEST_SAMPLES), longest)
+    common = int(lengths[np.searchsorted(np.cumsum(lengths), lengths.sum() / 2)])
+    length = max(min(round(welch_s * rate_hz), common), FEWEST_SAMPLES)
     step = length - length // 2
     cuts = [(start, stop) for start, stop in itertools.pairwise(edges.tolist()) if stop - start >= length]
     starts = np.concatenate([np.arange(start, stop - length + 1, step) for start, stop in cuts])
