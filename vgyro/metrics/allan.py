@@ -63,7 +63,7 @@ def allan_deviation(
             f"the longest gap-free stretch has {longest} samples", remedy="An Allan deviation needs 3 samples in a row"
         )
     allan = engines.get(engine).allan
-    sums, counts = allan.second_differences(rate, rate_hz, factors, edges, LONGEST_TAU)
+    sums, counts = allan.differences(rate, factors, edges, LONGEST_TAU)
     exponent = noise_exponents(rate, edges, factors, allan)
     edf = np.empty(factors.size)
     for row, (m, alpha) in enumerate(zip(factors.tolist(), exponent.tolist(), strict=True)):

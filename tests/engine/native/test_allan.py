@@ -31,10 +31,10 @@ def factors_of(samples: int) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["white", "biased", "drifting", "single"])
 @pytest.mark.parametrize("samples", [3, 4, 5, 11, 2047, 2050, 300_001])
-def test_second_differences_equal_allantools(kind: str, samples: int):
+def test_differences_equal_allantools(kind: str, samples: int):
     rate, factors = series(kind, samples), factors_of(samples)
-    sums, counts = allan.second_differences(rate, RATE_HZ, factors)
-    expected, number = reference.second_differences(rate, RATE_HZ, factors)
+    sums, counts = allan.differences(rate, factors)
+    expected, number = reference.differences(rate, factors)
     np.testing.assert_array_equal(counts, number)
     np.testing.assert_allclose(sums, expected, rtol=1e-12)
 
@@ -42,14 +42,14 @@ def test_second_differences_equal_allantools(kind: str, samples: int):
 def test_a_day_at_200_hz_equals_allantools():
     rate = series("drifting", 17_280_000)
     factors = np.array([1, 7, 200, 6_350, 1_000_003, 5_760_000])
-    sums, counts = allan.second_differences(rate, RATE_HZ, factors)
+    sums, counts = allan.differences(rate, factors)
     _, expected, _, number = allantools.oadev(rate, RATE_HZ, "freq", factors / RATE_HZ)
     np.testing.assert_array_equal(counts, number)
     np.testing.assert_allclose(np.sqrt(sums / counts), expected, rtol=1e-12)
 
 
 def test_factors_that_do_not_fit_have_no_differences():
-    sums, counts = allan.second_differences(np.arange(10.0) ** 2, 1.0, np.array([4, 5, 100]))
+    sums, counts = allan.differences(np.arange(10.0) ** 2, np.array([4, 5, 100]))
     np.testing.assert_array_equal(counts, [3, 0, 0])
     # Means of four of k² rise by 4²·… : θ(k+8) - 2θ(k+4) + θ(k) over 4, from the definition.
     means = [np.mean(np.arange(k, k + 4.0) ** 2) for k in range(7)]
@@ -72,8 +72,8 @@ def test_stretches_are_summed_without_bridging():
     rate, edges = series("drifting", 50_000), np.array([0, 3, 10, 10, 5_000, 20_001, 20_050, 50_000])
     factors = np.array([1, 2, 3, 16, 500, 5_000, 9_000, 15_000])
     for share in (2, 3):
-        sums, counts = allan.second_differences(rate, RATE_HZ, factors, edges, share)
-        expected, number = reference.second_differences(rate, RATE_HZ, factors, edges, share)
+        sums, counts = allan.differences(rate, factors, edges, share)
+        expected, number = reference.differences(rate, factors, edges, share)
         np.testing.assert_array_equal(counts, number)
         np.testing.assert_allclose(sums, expected, rtol=1e-12)
     assert number[-1] == 0 < number[-2]
@@ -81,12 +81,12 @@ def test_stretches_are_summed_without_bridging():
     for ours, theirs in zip(found, reference.lag_products(rate, factors, edges, 30), strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * ours.max())
     with pytest.raises(ValueError, match="edges"):
-        allan.second_differences(rate, RATE_HZ, factors, np.array([0, 60_000]))
+        allan.differences(rate, factors, np.array([0, 60_000]))
 
 
 @pytest.mark.parametrize("value", [3.0, 0.1, -1e-7])
 def test_constant_series_has_nothing(value: float):
-    assert not allan.second_differences(np.full(501, value), 1.0, np.array([1, 10]))[0].any()
+    assert not allan.differences(np.full(501, value), np.array([1, 10]))[0].any()
     assert not allan.lag_products(np.full(501, value), np.array([1, 10]))[0].any()
 
 
@@ -113,7 +113,7 @@ import numpy as np
 from vgyro.engine.native import allan
 rate = np.random.default_rng(1).standard_normal(2_000_003)
 factors = np.unique(np.geomspace(1, 600_000, 30).astype(np.int64))
-for values in (*allan.second_differences(rate, 200.0, factors), *allan.lag_products(rate, factors)):
+for values in (*allan.differences(rate, factors), *allan.lag_products(rate, factors)):
     print(values.tobytes().hex())
 """
 

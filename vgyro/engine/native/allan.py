@@ -1,4 +1,4 @@
-"""Overlapping Allan variance, its degrees of freedom and its limits, and what tells kinds of noise apart; by C kernels.
+"""Allan variances, their degrees of freedom and limits, and what tells kinds of noise apart; by C kernels.
 
 All averaging factors go through the angle together, block by block. The reference engine does the same by allantools.
 """
@@ -10,41 +10,126 @@ import numpy as np
 from vgyro.engine.native import _allan, pool
 from vgyro.engine.native.allan_freedom import degrees_of_freedom, limits
 
-__all__ = ["degrees_of_freedom", "lag_products", "limits", "second_differences"]
+__all__ = ["degrees_of_freedom", "differences", "differences_over_losses", "lag_products", "limits", "strides"]
 
 PIECE = 256  # blocks of _allan.BLOCK differences
+ORDER = {"overlapping": 2, "hadamard": 3}
+WEIGHTS = {"overlapping": 2.0, "modified": 2.0, "hadamard": 6.0}  # sum of the squared weights of the means
+PRESENT_TENTHS = 9
+DENSE = 64  # differences that begin within one averaging time, where some are left out
 
 
-def second_differences(
-    rate: np.ndarray, rate_hz: float, factors: np.ndarray, edges: np.ndarray | None = None, share: int = 2
+def differences(
+    rate: np.ndarray,
+    factors: np.ndarray,
+    edges: np.ndarray | None = None,
+    share: int = 2,
+    kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the squared overlapping second differences of the angle, divided by 2τ², and how many there are.
+    """Sum of the squared differences of means whose mean is an Allan variance, and how many there are.
 
     rate    : array [T], deg/s
-    factors : array [M] int, averaging factors m; τ = m / rate_hz (rate_hz itself cancels)
+    factors : array [M] int, averaging factors m; τ = m sample periods
     edges   : array [S + 1] int, first sample of each gap-free stretch, and T; None: there is no gap
-    share   : stretches of less than share·m samples are left out, and those of 2m and less
-    returns : sums [M] in (deg/s)², counts [M]; sums / counts is the overlapping Allan variance. Zeros where no stretch
-              is long enough.
-    Riley, NIST SP 1065, eq. 11. Differences are summed in blocks of 2048, the blocks pairwise.
+    share   : stretches of less than share·m samples are left out, and those with a single difference
+    kind    : overlapping, modified or hadamard
+    returns : sums [M] in (deg/s)², counts [M]; sums / counts is the variance. Zeros where no stretch is long enough.
+    Of the angle θ, over all k, Riley, NIST SP 1065, eq. 11, 15 and 19:
+        overlapping  (θ[k+2m] - 2θ[k+m] + θ[k])² / 2τ²
+        modified     ((1/m) Σ_{j=k}^{k+m-1} (θ[j+2m] - 2θ[j+m] + θ[j]))² / 2τ²
+        hadamard     (θ[k+3m] - 3θ[k+2m] + 3θ[k+m] - θ[k])² / 6τ²
+    Differences are summed in blocks of 2048, the blocks pairwise.
     """
-    del rate_hz
     edges = _edges(rate, edges)
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     sums, counts = np.zeros(len(factors)), np.zeros(len(factors), dtype=np.int64)
     lengths = np.diff(edges)
-    most = np.minimum(lengths // share, (lengths - 1) // 2)
+    # Those of the modified variance reach over 3m - 1 samples, the others over order·m.
+    reach, spare = (3, 1) if kind == "modified" else (ORDER[kind], 0)
+    most = np.minimum(lengths // share, (lengths - 1 + spare) // reach)
     for row, m in enumerate(factors.tolist()):
-        counts[row] = np.sum(lengths[most >= m] + 1 - 2 * m)
+        counts[row] = np.sum(lengths[most >= m] + 1 + spare - reach * m)
     possible = counts > 0
     m = factors[possible]
     if m.size:
         angle = _angle(rate, edges, level=False)
-        blocks = _blocks(lengths, most)
-        parts = np.empty((m.size, len(blocks)))
-        pool.run(lambda start, stop: _allan.second(angle, blocks, m, parts, start, stop), len(blocks), PIECE)
-        sums[possible] = parts.sum(axis=1) / (2.0 * m**2)
+        sums[possible] = _summed(angle, edges, m, most, share, kind) / (WEIGHTS[kind] * m.astype(float) ** 2)
     return sums, counts
+
+
+def _summed(
+    angle: np.ndarray, edges: np.ndarray, factors: np.ndarray, most: np.ndarray, share: int, kind: str
+) -> np.ndarray:
+    if kind == "modified":
+        sums, share = np.empty(len(factors)), max(share, 3)
+        pool.run(lambda start, stop: _allan.averaged(angle, edges, factors, share, sums, start, stop), len(factors), 1)
+        return sums / factors.astype(float) ** 2
+    blocks = _blocks(np.diff(edges), most)
+    parts = np.empty((len(factors), len(blocks)))
+    pool.run(
+        lambda start, stop: _allan.differences(angle, blocks, factors, ORDER[kind], parts, start, stop),
+        len(blocks),
+        PIECE,
+    )
+    return parts.sum(axis=1)
+
+
+def differences_over_losses(
+    rate: np.ndarray,
+    factors: np.ndarray,
+    slot: np.ndarray,
+    edges: np.ndarray,
+    share: int = 3,
+    kind: str = "overlapping",
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The same over stretches in which samples are lost: differences of the means of the samples that are there.
+
+    rate    : array [T], deg/s;  factors : array [M] int, averaging factors m
+    slot    : array [T] int, place of each sample on an even time grid, rising
+    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
+    share   : stretches of less than share·m slots are left out
+    kind    : overlapping, modified or hadamard
+    returns : sums [M] in (deg/s)²; excess [M]; counts [M]; possible [M], differences there would be without a loss
+    A mean over m slots counts where nine tenths of its samples are there, and a modified difference where nine tenths
+    of the differences that it averages do; nothing is put in the place of a lost sample. The samples of n out of m
+    slots have, where the noise is white, a mean of variance σ₁²/n, not σ₁²/m: excess·σ₁² / counts is what that adds to
+    sums / counts (for overlapping differences excess = Σ (1/n₁ + 1/n₂ - 2/m)/2), σ₁² the variance of a single sample.
+    From m = 128 on, differences begin `strides` slots apart; a modified one averages that many fewer.
+    """
+    factors = np.ascontiguousarray(factors, dtype=np.int64)
+    edges = np.ascontiguousarray(edges, dtype=np.int64)
+    steps = strides(factors)
+    totals, counts = np.zeros((len(factors), 2)), np.zeros(len(factors), dtype=np.int64)
+    if factors.size and rate.size:
+        angle, have = np.empty(edges[-1] + len(edges) - 1), np.empty(edges[-1] + len(edges) - 1, dtype=np.int32)
+        rate = np.ascontiguousarray(rate, dtype=np.float64)
+        _allan.slots(rate, np.ascontiguousarray(slot, dtype=np.int64), edges, angle, have)
+        order = ORDER.get(kind, 0)
+        pool.run(
+            lambda start, stop: _allan.lossy(
+                angle, have, edges, factors, steps, order, share, PRESENT_TENTHS, totals, counts, start, stop
+            ),
+            len(factors),
+            1,
+        )
+    totals /= WEIGHTS[kind]
+    if kind == "modified":
+        # White noise of m slots: the modified variance is this part of the other one.
+        totals[:, 1] *= (factors**2 + 1) / (2 * factors**2)
+    return totals[:, 0], totals[:, 1], counts, possible_differences(factors, np.diff(edges), share, kind)
+
+
+def strides(factors: np.ndarray) -> np.ndarray:
+    """Slots between the differences over losses at each averaging factor."""
+    return np.maximum(factors // DENSE, 1)
+
+
+def possible_differences(factors: np.ndarray, slots: np.ndarray, share: int, kind: str) -> np.ndarray:
+    """Differences over losses at each factor [M], were nothing lost of stretches of `slots` [S]."""
+    steps = strides(factors)
+    reach = 2 * factors + (factors // steps - 1) * steps if kind == "modified" else ORDER[kind] * factors
+    found = (slots - reach[:, None]) // steps[:, None] + 1
+    return np.where((slots >= share * factors[:, None]) & (slots >= reach[:, None]), found, 0).sum(axis=1)
 
 
 def lag_products(
@@ -53,7 +138,7 @@ def lag_products(
     """Σ z² and Σ z z' of the means z of adjacent blocks of m samples, z' the following mean.
 
     rate    : array [T];  factors : array [M] int, m; an incomplete last block is left out
-    edges   : as in second_differences;  fewest : means, at least 4; stretches with fewer are left out
+    edges   : as in differences;  fewest : means, at least 4; stretches with fewer are left out
     returns : squares [M, 3], products [M, 3]: of the means about their line, of their differences about the mean
               difference, of the second differences about theirs, each stretch by itself. Zeros without a stretch.
     """

@@ -1,39 +1,83 @@
-"""Degrees of freedom of an overlapping Allan variance, and chi² limits."""
+"""Degrees of freedom of overlapping, modified and Hadamard variances, and chi² limits."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-STEEPEST = -2  # random walk of the rate: the steepest noise for which the two-sample variance exists
 FLATTEST = 2  # white noise of the angle
 MOST_TERMS = 100  # J_max of the paper
-TABLE_2 = {1: (790.0, 410.0), 0: (2 / 3, 1 / 3), -1: (0.852, 0.375), -2: (1.079, 0.368)}  # a0, a1 for d = 2
-TABLE_3 = (15.23, 12.0)  # b0, b1 for d = 2
-WHITE_ANGLE = (35 / 18, 1.0)  # a0 = C(8, 4) / C(4, 2)², a1 = d / 2
 
 
-def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int) -> np.ndarray:
-    """Equivalent degrees of freedom of the overlapping Allan variance of gap-free stretches.
+@dataclass(frozen=True)
+class Variance:
+    """A variance as the paper sees it: differences of order d; angles averaged first (F = 1) or not (F = m).
+
+    limits : by exponent, a0 and a1 of table 1 (modified) or 2;  level : b0 and b1 of table 3
+    """
+
+    d: int
+    modified: bool
+    steepest: int
+    limits: dict[int, tuple[float, float]]
+    level: tuple[float, float] = (1.0, 0.0)
+
+    def count(self, samples: np.ndarray, factor: int) -> np.ndarray:
+        """M of the paper: differences in stretches of `samples` rates."""
+        return samples + 1 - self.d * factor - (factor - 1 if self.modified else 0)
+
+
+KINDS = {
+    "overlapping": Variance(
+        2, False, -2, {2: (35 / 18, 1.0), 1: (790.0, 410.0), 0: (2 / 3, 1 / 3), -1: (0.852, 0.375), -2: (1.079, 0.368)},
+        (15.23, 12.0),
+    ),
+    "modified": Variance(
+        2, True, -2, {2: (7 / 9, 1 / 2), 1: (0.997, 0.616), 0: (1.033, 0.607), -1: (1.048, 0.534), -2: (1.302, 0.535)},
+    ),
+    "hadamard": Variance(
+        3, False, -4,
+        {2: (2.31, 1.5), 1: (9950.0, 6520.0), 0: (7 / 9, 1 / 2), -1: (0.997, 0.617), -2: (1.033, 0.607),
+         -3: (1.053, 0.553), -4: (1.302, 0.535)},
+        (47.8, 40.0),
+    ),
+}  # fmt: skip
+
+
+def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind: str = "overlapping") -> np.ndarray:
+    """Equivalent degrees of freedom of an Allan variance of gap-free stretches, from all its overlapping differences.
 
     alpha   : exponent of the rate's power spectrum: 0 white, -1 flicker, -2 random walk, 1 and 2 noise of the angle
-    factor  : averaging factor m;  samples : array [S] of the rates in each stretch, at least 2m
+    factor  : averaging factor m;  samples : array [S] of the rates in each stretch, at least as many as one difference
+              needs: 2m, and 3m for modified and hadamard
+    kind    : overlapping, modified or hadamard
     returns : array of the shape of `samples`
-    Greenhall & Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003: d = 2, F = S = m.
+    Greenhall & Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003: d = 2, and d = 3 for
+    hadamard; F = m, and F = 1 for modified; S = m. An exponent for which a variance does not exist counts as the
+    nearest for which it does.
     """
-    alpha = min(max(alpha, STEEPEST), FLATTEST)
-    count = np.atleast_1d(np.asarray(samples, dtype=float)) + 1 - 2 * factor  # M of the paper
-    ratio = count / factor
-    edf = np.empty(count.shape)
-    if alpha == FLATTEST:
-        # The formula for white noise of the angle ends where two differences overlap for all of the stretch.
-        long = ratio > 2
-        edf[long] = count[long] / (WHITE_ANGLE[0] - WHITE_ANGLE[1] / ratio[long])
-        edf[~long] = _by_sums(1, factor, count[~long])
+    variance = KINDS[kind]
+    alpha = min(max(alpha, variance.steepest), FLATTEST)
+    count = variance.count(np.atleast_1d(np.asarray(samples, dtype=float)), factor)
+    if variance.modified:
+        edf = _by_sums(variance, alpha, factor, count)
+    elif alpha == FLATTEST:
+        # The formula for white noise of the angle ends where differences overlap for all of the stretch.
+        edf = np.empty(count.shape)
+        long = np.ceil(count / factor) > variance.d
+        a0, a1 = _white_angle(variance.d)
+        edf[long] = count[long] / (a0 - a1 * factor / count[long])
+        edf[~long] = _by_sums(variance, 1, factor, count[~long])
     else:
-        edf = _by_sums(alpha, factor, count)
+        edf = _by_sums(variance, alpha, factor, count)
     return edf.reshape(np.shape(samples))
+
+
+def _white_angle(d: int) -> tuple[float, float]:
+    """a0 and a1 of case 4."""
+    return math.comb(4 * d, 2 * d) / math.comb(2 * d, d) ** 2, d / 2
 
 
 def limits(deviation: np.ndarray, edf: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
@@ -44,54 +88,64 @@ def limits(deviation: np.ndarray, edf: np.ndarray, confidence: float) -> tuple[n
     return deviation * np.sqrt(edf / chdtri(edf, tail)), deviation * np.sqrt(edf / chdtri(edf, 1 - tail))
 
 
-def _by_sums(alpha: int, factor: int, count: np.ndarray) -> np.ndarray:
-    """The three cases of the paper for alpha <= 1: the sum itself, its limit for long series, the sum in between."""
-    terms, ratio = np.minimum(count, 3 * factor), count / factor
-    short, long = terms <= MOST_TERMS, (terms > MOST_TERMS) & (ratio > 3)
+def _by_sums(variance: Variance, alpha: int, factor: int, count: np.ndarray) -> np.ndarray:
+    """Cases 1 to 3 of the paper: the sum itself, its limit for long series, the sum in between."""
+    d = variance.d
+    terms, ratio = np.minimum(count, (d + 1) * factor), count / factor
+    short, long = terms <= MOST_TERMS, (terms > MOST_TERMS) & (ratio > d + 1)
     edf = np.empty(count.shape)
-    filter_factor = factor if alpha == 1 or 3 * factor <= MOST_TERMS else math.inf
-    edf[short] = _exact(alpha, filter_factor, count[short], terms[short], float(factor))
-    flat = (TABLE_3[0] + TABLE_3[1] * math.log(factor)) ** 2 if alpha == 1 else 1.0
-    a0, a1 = TABLE_2[alpha]
+    own = alpha == 1 and not variance.modified
+    filter_factor = 1.0 if variance.modified else factor if own or (d + 1) * factor <= MOST_TERMS else math.inf
+    shape = _Shape(d, alpha, filter_factor)
+    edf[short] = shape.exact(count[short], terms[short], float(factor))
+    flat = (variance.level[0] + variance.level[1] * math.log(factor)) ** 2 if own else 1.0
+    a0, a1 = variance.limits[alpha]
     edf[long] = flat * ratio[long] / (a0 - a1 / ratio[long])
     for index in np.flatnonzero(~short & ~long):
         stride = MOST_TERMS / float(ratio[index])
         most = np.array([float(MOST_TERMS)])
-        width, level = (stride, flat) if alpha == 1 else (math.inf, None)
-        edf[index] = _exact(alpha, width, most, most, stride, level).item()
+        shape = _Shape(d, alpha, stride if own else filter_factor if variance.modified else math.inf)
+        edf[index] = shape.exact(most, most, stride, flat if own else None).item()
     return edf
 
 
-def _exact(
-    alpha: int, filter_factor: float, count: np.ndarray, terms: np.ndarray, stride: float, level: float | None = None
-) -> np.ndarray:
-    """M·s(0)² / Σ_j (1 - |j|/M) s(j/S)², |j| <= J: eq. 10 and 13; level: s(0)² where it is known."""
-    most = int(terms.max(initial=0))
-    lag = np.arange(most + 1)
-    squares = _structure(lag / stride, filter_factor, alpha) ** 2
-    weight = np.where(lag < terms[:, None], 2.0, np.where(lag == terms[:, None], 1.0, 0.0))
-    weight[:, 0] = 1.0
-    sums = (weight * (1 - lag / count[:, None])) @ squares
-    return (squares[0] if level is None else level) * count / sums
+@dataclass(frozen=True)
+class _Shape:
+    """Autocovariance of the differences: order d, exponent alpha, F."""
 
+    d: int
+    alpha: int
+    filter_factor: float
 
-def _structure(t: np.ndarray, filter_factor: float, alpha: int) -> np.ndarray:
-    """s_z of the paper, eq. 9, for d = 2."""
-    outer = _filtered(t - 2, filter_factor, alpha) + _filtered(t + 2, filter_factor, alpha)
-    inner = _filtered(t - 1, filter_factor, alpha) + _filtered(t + 1, filter_factor, alpha)
-    return 6 * _filtered(t, filter_factor, alpha) - 4 * inner + outer
+    def exact(self, count: np.ndarray, terms: np.ndarray, stride: float, level: float | None = None) -> np.ndarray:
+        """M·s(0)² / Σ_j (1 - |j|/M) s(j/S)², |j| <= J: eq. 10 and 13; level: s(0)² where it is known."""
+        most = int(terms.max(initial=0))
+        lag = np.arange(most + 1)
+        squares = self.structure(lag / stride) ** 2
+        weight = np.where(lag < terms[:, None], 2.0, np.where(lag == terms[:, None], 1.0, 0.0))
+        weight[:, 0] = 1.0
+        sums = (weight * (1 - lag / count[:, None])) @ squares
+        return (squares[0] if level is None else level) * count / sums
 
+    def structure(self, t: np.ndarray) -> np.ndarray:
+        """s_z of the paper, eq. 9."""
+        total = math.comb(2 * self.d, self.d) * self._filtered(t)
+        for step in range(1, self.d + 1):
+            weight = (-1) ** step * math.comb(2 * self.d, self.d - step)
+            total = total + weight * (self._filtered(t - step) + self._filtered(t + step))
+        return total
 
-def _filtered(t: np.ndarray, filter_factor: float, alpha: int) -> np.ndarray:
-    """s_x, eq. 8."""
-    if math.isinf(filter_factor):
-        return _covariance(t, alpha + 2)
-    near = _covariance(t - 1 / filter_factor, alpha) + _covariance(t + 1 / filter_factor, alpha)
-    return filter_factor**2 * (2 * _covariance(t, alpha) - near)
+    def _filtered(self, t: np.ndarray) -> np.ndarray:
+        """s_x, eq. 8."""
+        if math.isinf(self.filter_factor):
+            return _covariance(t, self.alpha + 2)
+        step = 1 / self.filter_factor
+        near = _covariance(t - step, self.alpha) + _covariance(t + step, self.alpha)
+        return self.filter_factor**2 * (2 * _covariance(t, self.alpha) - near)
 
 
 def _covariance(t: np.ndarray, alpha: int) -> np.ndarray:
-    """s_w, eq. 7: -|t|, t² log|t|, |t|³, t⁴ log|t|, |t|⁵ for alpha = 2, 1, 0, -1, -2."""
+    """s_w, eq. 7: -|t|, t² log|t|, |t|³, t⁴ log|t|, |t|⁵, … for alpha = 2, 1, 0, -1, -2, …"""
     size = np.abs(t)
     if alpha == 2:
         return -size

@@ -1,4 +1,4 @@
-"""Allan variance, its degrees of freedom and its limits, by allantools; what tells kinds of noise apart, in NumPy.
+"""Allan variances, their degrees of freedom and limits, by allantools; losses, and kinds of noise, in NumPy.
 
 allantools works on one gap-free series at a time; the sums of several are added here.
 """
@@ -11,33 +11,111 @@ import allantools
 import numpy as np
 from scipy.stats import chi2
 
-STEEPEST = -2  # random walk of the rate: the steepest noise for which the two-sample variance exists
+ESTIMATORS = {"overlapping": allantools.oadev, "modified": allantools.mdev, "hadamard": allantools.ohdev}
+REACH = {"overlapping": 2, "modified": 3, "hadamard": 3}
+D = {"overlapping": 2, "modified": 2, "hadamard": 3}
+STEEPEST = {"overlapping": -2, "modified": -2, "hadamard": -4}  # noise for which the variance exists
 FLATTEST = 2  # white noise of the angle
+NOT_IN_ALLANTOOLS = (1.302, 0.535)  # its table 2 of the paper lacks the last row: d = 3, random walk of random walk
+PRESENT = 0.9
+DENSE = 64
 
 
-def second_differences(
-    rate: np.ndarray, rate_hz: float, factors: np.ndarray, edges: np.ndarray | None = None, share: int = 2
+def differences(
+    rate: np.ndarray,
+    factors: np.ndarray,
+    edges: np.ndarray | None = None,
+    share: int = 2,
+    kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the squared overlapping second differences of the angle, divided by 2τ², and how many there are.
+    """Sum of the squared differences of means whose mean is an Allan variance, and how many there are.
 
     rate    : array [T], deg/s
-    factors : array [M] int, ascending averaging factors m; τ = m / rate_hz
+    factors : array [M] int, ascending averaging factors m; τ = m sample periods
     edges   : array [S + 1] int, first sample of each gap-free stretch, and T; None: there is no gap
-    share   : stretches of less than share·m samples are left out, and those of 2m and less
-    returns : sums [M] in (deg/s)², counts [M]; sums / counts is the overlapping Allan variance. Zeros where no stretch
-              is long enough.
-    Riley, NIST SP 1065, eq. 11.
+    share   : stretches of less than share·m samples are left out, and those with a single difference
+    kind    : overlapping, modified or hadamard
+    returns : sums [M] in (deg/s)², counts [M]; sums / counts is the variance. Zeros where no stretch is long enough.
+    Riley, NIST SP 1065, eq. 11, 15 and 19.
     """
     sums, counts = np.zeros(len(factors)), np.zeros(len(factors), dtype=np.int64)
+    # Of a modified variance a stretch of 3m samples has two differences.
+    spare = 0 if kind == "modified" else 1
     for piece in _stretches(rate, edges):
         # allantools leaves out a τ with a single difference.
-        possible = np.flatnonzero((2 * factors < piece.size) & (share * factors <= piece.size))
+        possible = np.flatnonzero((REACH[kind] * factors + spare <= piece.size) & (share * factors <= piece.size))
         if possible.size:
-            angle = np.concatenate(([0.0], np.cumsum(piece - piece.mean()))) / rate_hz
-            _, deviation, _, number = allantools.oadev(angle, rate_hz, "phase", factors[possible] / rate_hz)
+            angle = np.concatenate(([0.0], np.cumsum(piece - piece.mean())))
+            _, deviation, _, number = ESTIMATORS[kind](angle, 1.0, "phase", factors[possible].astype(float))
             counts[possible] += number.astype(np.int64)
             sums[possible] += deviation**2 * number
     return sums, counts
+
+
+def differences_over_losses(
+    rate: np.ndarray,
+    factors: np.ndarray,
+    slot: np.ndarray,
+    edges: np.ndarray,
+    share: int = 3,
+    kind: str = "overlapping",
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The same over stretches in which samples are lost: differences of the means of the samples that are there.
+
+    rate    : array [T], deg/s;  factors : array [M] int, averaging factors m
+    slot    : array [T] int, place of each sample on an even time grid, rising
+    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
+    share   : stretches of less than share·m slots are left out
+    kind    : overlapping, modified or hadamard
+    returns : sums [M] in (deg/s)²; excess [M]; counts [M]; possible [M], differences there would be without a loss
+    A mean over m slots counts where nine tenths of its samples are there, and a modified difference where nine tenths
+    of the differences that it averages do; nothing is put in the place of a lost sample. The samples of n out of m
+    slots have, where the noise is white, a mean of variance σ₁²/n, not σ₁²/m: excess·σ₁² / counts is what that adds to
+    sums / counts (for overlapping differences excess = Σ (1/n₁ + 1/n₂ - 2/m)/2), σ₁² the variance of a single sample.
+    From m = 128 on, differences begin m // 64 slots apart; a modified one averages that many fewer.
+    allantools would take a mean of any number of samples, or one that bridges any gap.
+    """
+    found = np.zeros((4, len(factors)))
+    for start, stop in itertools.pairwise(edges.tolist()):
+        inside = (slot >= start) & (slot < stop)
+        there = np.zeros(stop - start)
+        there[slot[inside] - start] = 1
+        filled = np.zeros(stop - start)
+        filled[slot[inside] - start] = rate[inside] - (rate[inside].mean() if inside.any() else 0.0)
+        for row, m in enumerate(factors.tolist()):
+            if share * m <= stop - start and REACH[kind] * m <= stop - start:
+                found[:, row] += _one_stretch(filled, there, m, kind)
+    return found[0], found[1], found[2].astype(np.int64), found[3].astype(np.int64)
+
+
+def _one_stretch(rate: np.ndarray, there: np.ndarray, m: int, kind: str) -> np.ndarray:
+    """sums, excess, counts, possible of one stretch; rate [T] is 0 where `there` is."""
+    stride = max(m // DENSE, 1)
+    number, total = (
+        np.convolve(series, np.ones(m), "valid") if m < 64 else _moving(series, m) for series in (there, rate)
+    )
+    number = np.rint(number)
+    good = number >= PRESENT * m - 1e-9
+    mean = np.where(good, total, 0.0) / np.where(good, number, 1.0)
+    inverse = np.where(good, 1.0 / np.where(good, number, 1.0), 0.0)
+    weights = (1.0, -2.0, 1.0) if kind == "hadamard" else (-1.0, 1.0)
+    starts = len(mean) - (len(weights) - 1) * m
+    shifted = [slice(part * m, part * m + starts, stride) for part in range(len(weights))]
+    d = sum(weight * mean[at] for weight, at in zip(weights, shifted, strict=True))
+    e = sum(weight**2 * (inverse[at] - 1 / m) for weight, at in zip(weights, shifted, strict=True))
+    valid = np.logical_and.reduce([good[at] for at in shifted])
+    norm = sum(weight**2 for weight in weights)
+    if kind == "modified":
+        window = m // stride
+        d, e, count = (np.convolve(np.where(valid, part, 0.0), np.ones(window), "valid") for part in (d, e, valid))
+        valid = count >= PRESENT * window - 1e-9
+        d, e = d / np.maximum(count, 1), e / np.maximum(count, 1) * (m**2 + 1) / (2 * m**2)
+    return np.array([np.sum(d[valid] ** 2) / norm, np.sum(e[valid]) / norm, valid.sum(), valid.size])
+
+
+def _moving(series: np.ndarray, m: int) -> np.ndarray:
+    total = np.concatenate(([0.0], np.cumsum(series)))
+    return total[m:] - total[:-m]
 
 
 def lag_products(
@@ -46,7 +124,7 @@ def lag_products(
     """Σ z² and Σ z z' of the means z of adjacent blocks of m samples, z' the following mean.
 
     rate    : array [T];  factors : array [M] int, m; an incomplete last block is left out
-    edges   : as in second_differences;  fewest : means, at least 4; stretches with fewer are left out
+    edges   : as in differences;  fewest : means, at least 4; stretches with fewer are left out
     returns : squares [M, 3], products [M, 3]: of the means about their line, of their differences about the mean
               difference, of the second differences about theirs, each stretch by itself. Zeros without a stretch.
     """
@@ -73,20 +151,28 @@ def _stretches(rate: np.ndarray, edges: np.ndarray | None) -> list[np.ndarray]:
     return [rate] if edges is None else [rate[start:stop] for start, stop in itertools.pairwise(edges.tolist())]
 
 
-def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int) -> np.ndarray:
-    """Equivalent degrees of freedom of the overlapping Allan variance of gap-free stretches.
+def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind: str = "overlapping") -> np.ndarray:
+    """Equivalent degrees of freedom of an Allan variance of gap-free stretches, from all its overlapping differences.
 
     alpha   : exponent of the rate's power spectrum: 0 white, -1 flicker, -2 random walk, 1 and 2 noise of the angle
     factor  : averaging factor m;  samples : array [S] of the rates in each stretch
+    kind    : overlapping, modified or hadamard
     returns : array of the shape of `samples`
     Greenhall & Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003.
     """
-    alpha = min(max(alpha, STEEPEST), FLATTEST)
+    d, modified = D[kind], kind == "modified"
+    alpha = min(max(alpha, STEEPEST[kind]), FLATTEST)
     edf = []
     for number in np.ravel(samples).tolist():
-        # The published formula for white noise of the angle ends at 4m.
-        known = 1 if alpha == FLATTEST and number + 1 <= 4 * factor else alpha
-        edf.append(float(allantools.edf_greenhall(known, 2, int(factor), number + 1, overlapping=True)))
+        count = number + 1 - d * factor
+        # The published formula for white noise of the angle ends at 4m, for d = 3 at 6m.
+        known = 1 if alpha == FLATTEST and not modified and np.ceil(count / factor) <= d else alpha
+        if known == STEEPEST["hadamard"] and min(count, 4 * factor) > 100 and count > 4 * factor:
+            a0, a1 = NOT_IN_ALLANTOOLS
+            edf.append(count / factor / (a0 - a1 * factor / count))
+        else:
+            found = allantools.edf_greenhall(known, d, int(factor), number + 1, overlapping=True, modified=modified)
+            edf.append(float(found))
     return np.array(edf).reshape(np.shape(samples))
 
 

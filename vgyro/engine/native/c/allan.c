@@ -34,9 +34,126 @@ void vg_allan_angle(const double *rate, const int64_t *edge, size_t stretches, i
     }
 }
 
-void vg_allan_second(const double *angle, const vg_allan_block *block, const int64_t *factor, size_t factors,
-                     size_t blocks, size_t first, size_t last, double *sums) {
-    VG_CHOOSE(allan_second)(angle, block, factor, factors, blocks, first, last, sums);
+void vg_allan_differences(const double *angle, const vg_allan_block *block, const int64_t *factor, size_t factors,
+                          int order, size_t blocks, size_t first, size_t last, double *sums) {
+    VG_CHOOSE(allan_differences)(angle, block, factor, factors, order, blocks, first, last, sums);
+}
+
+/* Σ W², W(k) = Σ_{j=k}^{k+m-1} D(j), for `count` k; D the second difference, so W(k+1) - W(k) is the third. */
+static double averaged(const double *x0, size_t m, size_t count) {
+    const double *x1 = x0 + m, *x2 = x1 + m, *x3 = x2 + m;
+    double total = 0;
+    /* Summed anew now and then, so that rounding does not add up. */
+    size_t anew = m > VG_ALLAN_BLOCK ? m : VG_ALLAN_BLOCK;
+    for (size_t k = 0; k < count;) {
+        double sum = 0;
+        for (size_t j = k; j < k + m;) {
+            double part = 0;
+            for (size_t stop = j + PART < k + m ? j + PART : k + m; j < stop; j++) part += x2[j] - 2 * x1[j] + x0[j];
+            sum += part;
+        }
+        for (size_t end = k + anew < count ? k + anew : count; k < end;) {
+            double part = 0;
+            for (size_t stop = k + PART < end ? k + PART : end; k < stop; k++) {
+                part += sum * sum;
+                if (k + 1 < count) sum += x3[k] - x0[k] + 3 * (x1[k] - x2[k]);
+            }
+            total += part;
+        }
+    }
+    return total;
+}
+
+double vg_allan_averaged(const double *angle, const int64_t *edge, size_t stretches, size_t m, size_t share) {
+    double total = 0;
+    for (size_t p = 0; p < stretches; p++) {
+        size_t rates = (size_t)(edge[p + 1] - edge[p]);
+        if (rates >= share * m && rates + 2 > 3 * m) total += averaged(angle + edge[p] + p, m, rates + 2 - 3 * m);
+    }
+    return total;
+}
+
+void vg_allan_slots(const double *rate, const int64_t *slot, size_t samples, const int64_t *edge, size_t stretches,
+                    double *angle, int32_t *have) {
+    size_t k = 0;
+    for (size_t p = 0; p < stretches; p++) {
+        size_t first = k;
+        while (k < samples && slot[k] < edge[p + 1]) k++;
+        size_t n = k - first;
+        double base = n ? rate[first] : 0;
+        double mean = n ? base + sum_about(rate + first, n, base) / (double)n : 0, sum = 0;
+        double *x = angle + edge[p] + p;
+        int32_t *h = have + edge[p] + p, number = 0;
+        x[0] = 0, h[0] = 0;
+        for (int64_t at = edge[p]; at < edge[p + 1]; at++) {
+            if (first < k && slot[first] == at) sum += rate[first++] - mean, number++;
+            *++x = sum, *++h = number;
+        }
+    }
+}
+
+int64_t vg_allan_lossy(const double *angle, const int32_t *have, const int64_t *edge, size_t stretches, size_t m,
+                       size_t stride, int order, size_t share, double need, double total[2]) {
+    int64_t used = 0;
+    total[0] = total[1] = 0;
+    for (size_t p = 0; p < stretches; p++) {
+        size_t slots = (size_t)(edge[p + 1] - edge[p]), at = (size_t)edge[p] + p, reach = (size_t)order * m;
+        if (slots < share * m || slots < reach) continue;
+        size_t count = (slots - reach) / stride + 1;
+        used += VG_CHOOSE(allan_lossy)(angle + at, have + at, m, stride, order, count, need, total, total + 1);
+    }
+    return used;
+}
+
+typedef struct {
+    double d, e, there;
+} lossy_difference;
+
+static lossy_difference difference_at(const double *x, const int32_t *n, size_t m, double need) {
+    double p = n[m] - n[0], q = n[2 * m] - n[m];
+    if (p < need || q < need) return (lossy_difference){0, 0, 0};
+    double over_p = 1 / p, over_q = 1 / q;
+    return (lossy_difference){(x[2 * m] - x[m]) * over_q - (x[m] - x[0]) * over_p, over_p + over_q - 2 / (double)m, 1};
+}
+
+/* One stretch of vg_allan_lossy_averaged: `count` means of `window` differences. */
+static int64_t lossy_averaged(const double *x, const int32_t *n, size_t m, size_t stride, size_t window, size_t count,
+                              double need, double least, double total[2]) {
+    int64_t used = 0;
+    for (size_t k = 0; k < count;) {
+        lossy_difference sum = {0, 0, 0};
+        for (size_t j = k; j < k + window; j++) {
+            lossy_difference one = difference_at(x + j * stride, n + j * stride, m, need);
+            sum.d += one.d, sum.e += one.e, sum.there += one.there;
+        }
+        double squares = 0, excess = 0;
+        for (size_t stop = k + VG_ALLAN_BLOCK < count ? k + VG_ALLAN_BLOCK : count; k < stop; k++) {
+            if (sum.there >= least) {
+                double mean = sum.d / sum.there;
+                squares += mean * mean, excess += sum.e / sum.there, used++;
+            }
+            if (k + 1 == stop) continue;
+            size_t in = (k + window) * stride, out = k * stride;
+            lossy_difference next = difference_at(x + in, n + in, m, need), gone = difference_at(x + out, n + out, m, need);
+            sum.d += next.d - gone.d, sum.e += next.e - gone.e, sum.there += next.there - gone.there;
+        }
+        total[0] += squares, total[1] += excess;
+    }
+    return used;
+}
+
+int64_t vg_allan_lossy_averaged(const double *angle, const int32_t *have, const int64_t *edge, size_t stretches, size_t m,
+                                size_t stride, size_t share, double need, double least, double total[2]) {
+    int64_t used = 0;
+    size_t window = m / stride, reach = 2 * m + (window - 1) * stride;
+    total[0] = total[1] = 0;
+    for (size_t p = 0; p < stretches; p++) {
+        size_t slots = (size_t)(edge[p + 1] - edge[p]), at = (size_t)edge[p] + p;
+        if (slots < share * m || slots < reach) continue;
+        size_t count = (slots - reach) / stride + 1;
+        used += lossy_averaged(angle + at, have + at, m, stride, window, count, need, least, total);
+    }
+    return used;
 }
 
 /* For y, the differences of every m-th angle a (n >= 4 of them), w those of y and v those of w:
