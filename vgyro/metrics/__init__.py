@@ -15,6 +15,7 @@ from vgyro.metrics.pairs import noise_from_differences
 from vgyro.metrics.readings import moments, paper_readings
 from vgyro.metrics.spectrum import Density, Spectrum, flat_band, noise_density, spectral_density, thinned
 from vgyro.metrics.static_figures import LowPass, StaticFigures, static_figures, without_means
+from vgyro.metrics.tones import Tone, find_tones, share_tones
 
 __all__ = [
     "FIGURES",
@@ -30,6 +31,7 @@ __all__ = [
     "Resampled",
     "Spectrum",
     "StaticFigures",
+    "Tone",
     "Units",
     "allan_deviation",
     "averaging_factors",
@@ -37,6 +39,7 @@ __all__ = [
     "correlation_matrix",
     "dynamic_errors",
     "dynamic_figures",
+    "find_tones",
     "flat_band",
     "improvement_factor",
     "improvement_of_deviation",
@@ -49,6 +52,7 @@ __all__ = [
     "paper_readings",
     "read_curve",
     "resample",
+    "share_tones",
     "spectral_density",
     "static_figures",
     "stretches",

@@ -43,8 +43,8 @@ def spectral_density(
 ) -> Spectrum:
     """Amplitude density of a series by Welch's method, ONE-sided (√2 times the two-sided one).
 
-    rate    : array [T], deg/s;  welch_s : length of a Welch segment, s; cut to what half of the samples have: the length
-              of their gap-free stretch, or more
+    rate    : array [T], deg/s;  welch_s : length of a Welch segment, s; shorter where less than half of the
+              samples lie in gap-free stretches so long
     segment : array [T] int, number of the gap-free stretch; power is averaged over the stretches that are long enough
     returns : Spectrum; empty if no stretch has 8 samples
     Hann window, half overlap, each Welch segment's mean removed.  Welch (1967), IEEE Trans. Audio Electroacoust. 15(2).
