@@ -24,7 +24,7 @@ class DynamicErrors:
     error_mean, error_sigma : mean and standard deviation of rate - reference, deg/s
     error_sigma_aligned     : the same after shifting the reference by the delay
     error_sigma_scaled      : about offset + gain · shifted reference
-    amplitude deg/s, delay s, gain : of the fit
+    amplitude deg/s, delay s, gain : of the fit;  frequency : of a reference that is a sinusoid, Hz, else NaN
     sums     : of the errors after alignment, in units of 1 s: aligned, scaled; the ends of the stretches are left out
     products : [U, 9] of the fit's derivatives by offset, gain and delay (1, x, d): 11 1x 1d xx xd dd, then 1, x and d
                times the error about the fit, summed over the same units
@@ -39,7 +39,13 @@ class DynamicErrors:
     gain: float = math.nan
     sums: Units | None = None
     products: np.ndarray | None = None
+    frequency: float = math.nan
     note: str = ""
+
+    @property
+    def phase(self) -> float:
+        """Phase against a sinusoidal reference, -360·frequency·delay in -180 to 180, deg; negative: the rate lags."""
+        return -math.remainder(360 * self.frequency * self.delay, 360)
 
 
 @dataclass(frozen=True)
@@ -64,10 +70,11 @@ def dynamic_errors(
     segment         : array [T] int, number of the gap-free stretch
     most_delay_s    : largest delay that is searched, either way, s; the ends of each stretch are left out by as much
                       when the delay is fitted
-    returns         : DynamicErrors. Delay: the lag of the highest correlation between rate and reference, refined below
-                      a sample by Gauss-Newton steps on rate = offset + gain · reference(t - delay), the reference
-                      between samples by a cubic spline. Amplitude: gain · √2 · r.m.s. of the reference about its mean,
-                      which for a sinusoid is the amplitude of the fitted sinusoid.
+    returns         : DynamicErrors. Delay: the lag of the highest correlation between rate and reference, of a sinusoid
+                      at most half a period, refined below a sample by Gauss-Newton steps on
+                      rate = offset + gain · reference(t - delay), the reference between samples by a cubic spline.
+                      Amplitude: gain · √2 · r.m.s. of the reference about its mean, which for a sinusoid is the
+                      amplitude of the fitted sinusoid.
     Jiang et al. (2012), table 3 gives mean, 1σ (raw) and amplitude.
     """
     rate, reference = np.asarray(rate, dtype=float), np.asarray(reference, dtype=float)
@@ -89,7 +96,7 @@ def errors_of(rate: np.ndarray, truth: Truth) -> DynamicErrors:
     aligned, scaled, products = _errors_about(rate, truth, fit, grid)
     return DynamicErrors(
         mean, sigma, float(aligned.std(ddof=1)), float(scaled.std(ddof=1)), fit.gain * math.sqrt(2) * truth.swing,
-        fit.delay, fit.gain, joined([grid.units_of(aligned), grid.units_of(scaled)]), products,
+        fit.delay, fit.gain, joined([grid.units_of(aligned), grid.units_of(scaled)]), products, truth.frequency,
     )  # fmt: skip
 
 
@@ -102,7 +109,8 @@ def _coarse_lag(rate: np.ndarray, truth: Truth) -> int:
         inner = rate[run.start + margin : run.stop - margin] - mean
         products += lagged_products(inner, truth.reference[run] - truth.centre, 2 * margin + 1)
     # Position k of the moving reference stands for a delay of margin - k samples.
-    return margin - int(np.argmax(products / np.sqrt(truth.spread)))
+    reach = slice(margin - truth.most_lag, margin + truth.most_lag + 1)
+    return truth.most_lag - int(np.argmax((products / np.sqrt(truth.spread))[reach]))
 
 
 def _align(rate: np.ndarray, truth: Truth, delay: float) -> _Fit:

@@ -8,15 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from vgyro.config import MetricsOptions
+from vgyro.metrics.angle import AngleGrid
 from vgyro.metrics.bootstrap import Resampled, Units, block_sums, joined, resample, unit_grid
 from vgyro.metrics.dynamic import MOST_DELAY_S, DynamicErrors, errors_of
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.improvement import improvement_factor
 from vgyro.metrics.readings import moments
+from vgyro.metrics.sampling import Sampling
 from vgyro.metrics.truth import Truth, known_stretches
 
-SHIFTED = ("error_sigma_aligned", "error_sigma_scaled", "amplitude", "delay")
+SHIFTED = ("error_sigma_aligned", "error_sigma_scaled", "amplitude", "delay", "phase")
 OF_ERROR = "of the error"
+NO_SINUSOID = "the reference is no sinusoid"
 
 
 def dynamic_figures(
@@ -26,12 +29,14 @@ def dynamic_figures(
     segment: np.ndarray,
     singles: int,
     options: MetricsOptions,
+    sampling: Sampling | None = None,
 ) -> list[dict[str, Reading]]:
     """Errors of series against the true rate, and improvement factors of the virtual gyros.
 
     series    : S arrays [T], deg/s; the first `singles` are the gyros. Each is taken twice, one at a time
     reference : array [T], deg/s; NaN where it is not known
     segment   : array [T] int, number of the gap-free stretch
+    sampling  : of the T samples, for the angle; None: each gap ends a stretch
     returns   : S dictionaries, name → Reading; where the reference does not change, delay and what depends on it are
                 NaN with a note. Limits by moving-block bootstrap, the improvement factors with common blocks.
     """
@@ -42,15 +47,21 @@ def dynamic_figures(
     truth = Truth.of(reference if everywhere else reference[known], rate_hz, cuts, MOST_DELAY_S)
     if truth.reference.size < 2:
         nothing = Reading(math.nan, math.nan, math.nan, truth.note)
-        return [dict.fromkeys(("error_mean", "error_sigma", *SHIFTED), nothing) for _ in range(len(series))]
+        return [
+            dict.fromkeys(("error_mean", "error_sigma", *SHIFTED, "angle_drift_60s"), nothing)
+            for _ in range(len(series))
+        ]
     grid = unit_grid(cuts, rate_hz)
+    angle = AngleGrid.of((sampling or Sampling.of(rate_hz, segment)).without(~known))
     raw: list[Units] = []
     readings = []
     for values in series:
         rate = values if everywhere else values[known]
-        units = grid.units_of(rate - truth.reference)
+        error = rate - truth.reference
+        units, drift = grid.units_of(error), angle.drift(error, options.confidence)
+        del error
         of_error = moments(units, 0, options.bootstrap, options.seed, options.confidence)
-        row = {"error_mean": of_error["mean"], "error_sigma": of_error["sigma"]}
+        row = {"error_mean": of_error["mean"], "error_sigma": of_error["sigma"], "angle_drift_60s": drift}
         readings.append(row | _shifted(errors_of(rate, truth), options))
         raw.append(units)
     drawn = resample(joined(raw), options.bootstrap, options.seed)
@@ -69,13 +80,23 @@ def _shifted(error: DynamicErrors, options: MetricsOptions) -> dict[str, Reading
         for column, name in enumerate(SHIFTED[:2])
     }
     note = f"gain {error.gain:.6g}"
+    if math.isnan(error.frequency):
+        note += f"; {NO_SINUSOID}: √2 times the r.m.s. of what the rate has of it"
     for name, value, replicates in (
         ("amplitude", error.amplitude, gain * error.amplitude / error.gain),
         ("delay", error.delay, delay),
     ):
         low, high = np.quantile(replicates, [tail, 1 - tail])
         readings[name] = Reading(value, float(low), float(high), note if name == "amplitude" else "")
-    return readings
+    return {**readings, "phase": _phase(error, readings["delay"])}
+
+
+def _phase(error: DynamicErrors, delay: Reading) -> Reading:
+    """Phase of a sinusoid, deg; its limits are those of the delay."""
+    if math.isnan(error.frequency):
+        return Reading(math.nan, math.nan, math.nan, NO_SINUSOID)
+    low, high = (error.phase - 360 * error.frequency * (limit - error.delay) for limit in (delay.high, delay.low))
+    return Reading(error.phase, low, high, f"at {error.frequency:.6g} Hz")
 
 
 def _resampled_fit(

@@ -11,6 +11,10 @@ import numpy as np
 
 STILL = 1e-9
 PART = 1 << 16
+MOST_SAMPLES = 1 << 20
+FEWEST_PERIODS, SINUSOID = 2, 0.99
+"""A reference is a sinusoid if so many periods of one make up so much of its variance."""
+STEPS = 6
 FORGOTTEN = 64  # samples after which a cubic spline has forgotten its end: 0.27^64
 
 
@@ -22,6 +26,7 @@ class Truth:
     swing  : standard deviation, deg/s;  centre : deg/s, near its mean
     slopes : [T] derivative of the spline at the samples, per sample, within runs
     spread : [2·margin + 1] Σ of squares about the mean of the part that the inner rate meets, by its first sample
+    frequency : of a reference that is a sinusoid, Hz; NaN: it is none
     note   : why no delay can be fitted; "" where it can
     """
 
@@ -34,6 +39,7 @@ class Truth:
     centre: float = math.nan
     slopes: np.ndarray = field(default_factory=lambda: np.empty(0))
     spread: np.ndarray = field(default_factory=lambda: np.empty(0))
+    frequency: float = math.nan
     note: str = ""
 
     @classmethod
@@ -55,7 +61,14 @@ class Truth:
             slopes[run] = spline_slopes(reference[run])
         centre = float(np.mean(reference[runs[0]]))
         spread = _spread(reference, runs, margin, centre)
-        return cls(reference, rate_hz, cuts, margin, swing, runs, centre, slopes, spread)
+        longest = max(runs, key=lambda run: run.stop - run.start)
+        frequency = sinusoid_frequency(reference[longest], rate_hz)
+        return cls(reference, rate_hz, cuts, margin, swing, runs, centre, slopes, spread, frequency)
+
+    @property
+    def most_lag(self) -> int:
+        """Samples that a series may lag or lead: of a sinusoid half a period, beyond which it begins again."""
+        return self.margin if math.isnan(self.frequency) else min(self.margin, int(self.rate_hz / 2 / self.frequency))
 
     def inner(self) -> list[tuple[int, int]]:
         """Where the runs without their margins lie, in the series of inner samples alone."""
@@ -91,6 +104,33 @@ def known_stretches(known: np.ndarray, segment: np.ndarray | None) -> list[tuple
     borders = [0, *(np.flatnonzero(change) + 1).tolist(), len(known)]
     lengths = [stop - start for start, stop in itertools.pairwise(borders) if stop > start and known[start]]
     return list(itertools.pairwise(np.cumsum([0, *lengths]).tolist()))
+
+
+def sinusoid_frequency(values: np.ndarray, rate_hz: float) -> float:
+    """Frequency of a gap-free series [T] that is a sinusoid about a constant, Hz; NaN if it is none.
+
+    The peak of the spectrum, refined by Gauss-Newton steps on offset + a·cos + b·sin of MOST_SAMPLES at most.
+    """
+    from scipy.fft import next_fast_len, rfft
+
+    values = values[:MOST_SAMPLES] - values[:MOST_SAMPLES].mean()
+    size = next_fast_len(2 * len(values), real=True)
+    peak = int(np.argmax(np.abs(rfft(values * np.hanning(len(values)), size))))
+    # Counted from the middle, the frequency is found apart from the phase.
+    time = np.arange(len(values)) - (len(values) - 1) / 2
+    angular, left = 2 * math.pi * peak / size, values
+    for _ in range(STEPS):
+        cosine, sine = np.cos(angular * time), np.sin(angular * time)
+        rows = np.stack([np.ones(len(values)), cosine, sine])
+        size_of = np.linalg.lstsq(rows @ rows.T, rows @ values, rcond=None)[0]
+        left = values - size_of @ rows
+        slope = time * (size_of[2] * cosine - size_of[1] * sine)
+        steepness = float(slope @ slope)
+        angular += float(slope @ left) / steepness if steepness > 0 else 0.0
+    frequency = angular * rate_hz / (2 * math.pi)
+    periods = len(values) / rate_hz * frequency
+    pure = float(left @ left) <= (1 - SINUSOID) * float(values @ values)
+    return frequency if pure and periods >= FEWEST_PERIODS else math.nan
 
 
 def spline_slopes(values: np.ndarray) -> np.ndarray:
