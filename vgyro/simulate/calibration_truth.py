@@ -37,12 +37,12 @@ def calibration_truth(twin: Twin, board: Board, recording: str) -> dict[str, dic
     """Gyro of the axis that turns → figure → true value, for one calibration recording.
 
     scale (deg/s a count) and bias (counts): least-squares line of the counts over the rate, between the branches of
-    the hysteresis. nonlinearity_full_scale, _rms, _reading (ppm): residuals of that line, largest and r.m.s. over full
-    scale, largest over the rate itself from a tenth of full scale on. asymmetry (ppm): slopes of the lines through the
-    rates from 0 up and from 0 down, their difference over their mean. hysteresis (ppm of full scale): largest
-    |output reached from below - from above| at one rate (NaN if none is met both ways). zero_shift (deg/h): last zero
-    rate minus first. scale_temperature (ppm/K): of the sensitivity, over that at reference_c. Flicker and random walk
-    are noise here: they are left out.
+    the hysteresis. nonlinearity_full_scale, _rms, _reading (ppm): residuals of that line at the different rates,
+    largest and r.m.s. over full scale, largest over the rate itself from a tenth of full scale on. asymmetry (ppm):
+    slopes of the lines through the rates from 0 up and from 0 down, their difference over their mean. hysteresis (ppm
+    of full scale): largest |output reached from below - from above| at one rate (NaN if none is met both ways).
+    zero_shift (deg/h): last zero rate minus first. scale_temperature (ppm/K): of the sensitivity, over that at
+    reference_c. Flicker and random walk are noise here: they are left out.
     raises : DataError for a recording that is not on a rate table
     """
     spec = twin.recording(recording)
@@ -104,12 +104,13 @@ def true_points(twin: Twin, spec: TwinRecording, gyro: Gyro) -> TruePoints:
 def _figures(points: TruePoints, twin: Twin, spec: TwinRecording, gyro: Gyro) -> dict[str, float]:
     slope, offset = np.polyfit(points.rate, points.between, 1)
     residual = points.between / slope - points.rate - offset / slope
+    once = np.unique(points.rate, return_index=True)[1]
     fast = np.abs(points.rate) >= FAST * points.full_scale
     truth = truth_of(twin, spec, gyro.name)
     ratios = {
         "nonlinearity_full_scale": np.abs(residual).max() / points.full_scale,
         "nonlinearity_reading": np.abs(residual[fast] / points.rate[fast]).max(initial=0.0),
-        "nonlinearity_rms": np.sqrt(np.mean(residual**2)) / points.full_scale,
+        "nonlinearity_rms": np.sqrt(np.mean(residual[once] ** 2)) / points.full_scale,
         "asymmetry": _asymmetry(points),
         "hysteresis": _hysteresis(points) / points.full_scale,
     }
