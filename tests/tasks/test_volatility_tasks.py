@@ -90,7 +90,9 @@ def test_rows_of_every_table(tables):
     assert found["dcc"]["start"].tolist() == [0, 0, 50, 100, 150]
     assert found["dcc"]["stop"].tolist() == [300, 120, 170, 220, 270]
     assert found["dcc"]["time_start"].tolist() == [0, 0, 50, 100, 150]
-    assert found["arch_lm"]["series"].tolist() == ["level"] * 3 + ["detrended"] * 3 + ["standardised"] * 3
+    assert found["arch_lm"]["series"].tolist() == [
+        name for name in ("level", "detrended", "whitened", "standardised") for _ in range(3)
+    ]
     assert set(found["arch_lm"]["status"]) == {"ok"}
     assert set(found["arch_lm"]["samples"]) == {300}
     rows = found["weights"]
@@ -311,6 +313,7 @@ def test_only_rest_is_used_where_there_is_rest(tmp_path):
 def test_drift_shows_in_the_level_and_not_when_detrended(tmp_path):
     values = noise(600, 1) + 0.2 * np.sin(2 * np.pi * np.arange(600) / 300)[:, None]
     found = run_all(tmp_path, values)["arch_lm"]
-    level, detrended, _ = found["statistic"]
+    level, detrended, whitened, _ = found["statistic"]
     assert level > 100
     assert detrended < 12
+    assert whitened < 12

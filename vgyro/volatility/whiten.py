@@ -32,11 +32,14 @@ class Line:
 class Whitened:
     """One series, taken apart: series = drift + tones + what an autoregression makes of `residual`.
 
-    residual, drift [T]; lines; autoregression [p]; disturbed [T]: true for the samples that the fits left out
+    residual, drift, tones [T]; lines; autoregression [p]; disturbed [T]: true for the samples that the fits left out
+    quiet [T] : the residual if those samples had been zero, so that a knock does not ring on
     """
 
     residual: np.ndarray
+    quiet: np.ndarray
     drift: np.ndarray
+    tones: np.ndarray
     lines: tuple[Line, ...]
     autoregression: np.ndarray
     disturbed: np.ndarray
@@ -62,7 +65,8 @@ def whiten(series: np.ndarray, rate_hz: float, span: int) -> Whitened:
     missing = np.full(len(series), np.nan)
     flat = np.ptp(series) <= FLAT * np.max(np.abs(series), initial=0.0) if len(series) else True
     if len(series) < FEWEST_SAMPLES or flat or not np.isfinite(series).all():
-        return Whitened(missing, missing, (), np.empty(0), np.zeros(len(series), dtype=bool))
+        none = np.zeros(len(series), dtype=bool)
+        return Whitened(missing, missing, missing, missing, (), np.empty(0), none)
     drift = running_median(series, span)
     disturbed = far_off(series - drift)
     lines, tones = find_lines(np.where(disturbed, drift, series), rate_hz, span)
@@ -70,8 +74,10 @@ def whiten(series: np.ndarray, rate_hz: float, span: int) -> Whitened:
         drift = running_median(series - tones, span)
         disturbed = far_off(series - tones - drift)
     rest = series - tones - drift
-    autoregression = fit_autoregression(np.where(disturbed, 0.0, rest))
-    return Whitened(_innovations(rest, autoregression), drift, lines, autoregression, disturbed)
+    calm = np.where(disturbed, 0.0, rest)
+    autoregression = fit_autoregression(calm)
+    residual, quiet = _innovations(rest, autoregression), _innovations(calm, autoregression)
+    return Whitened(residual, quiet, drift, tones, lines, autoregression, disturbed)
 
 
 def running_median(series: np.ndarray, span: int) -> np.ndarray:
