@@ -16,7 +16,7 @@ ANALYSED = 1 << 16
 """Samples in the middle of which the response is analysed; as many again lie about them."""
 FEWEST = 1 << 12
 """Of a shorter stretch no response is taken: simulated noise stands in."""
-TONES = 72
+TONES, NEIGHBOURS = 144, 5
 LOWEST, HIGHEST = 2, 0.49
 """Lowest frequency in cycles of the analysed samples, highest in cycles a sample."""
 SMALL = 0.1
@@ -112,10 +112,13 @@ def _delay(frequency: np.ndarray, gain: np.ndarray, highest: float) -> float:
 def _bandwidths(frequency: np.ndarray, power: np.ndarray, highest: float) -> tuple[float, float]:
     """-3 dB bandwidth and noise-equivalent bandwidth, Hz, of a power gain that is 1 at frequency 0; NaN without one.
 
+    Medians of NEIGHBOURS gains are used: of a smooth fall they are the gains, and a method that adapts itself adds noise.
     Between the frequencies a cubic spline of the logarithms, below the lowest a parabola, above the highest a constant.
     """
     from scipy.interpolate import CubicSpline
+    from scipy.ndimage import median_filter
 
+    power = median_filter(power, NEIGHBOURS, mode="nearest")
     below = np.flatnonzero(power < 0.5)
     if below.size == 0:
         return math.nan, math.nan
