@@ -1,18 +1,25 @@
-"""Overlapping Allan deviation with degrees of freedom and chi² limits, over gap-free segments."""
+"""Allan deviations with degrees of freedom and chi² limits, over gap-free segments and over short losses."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
 
 from vgyro import engine as engines
 from vgyro.errors import TooShort
 from vgyro.metrics.noise_type import noise_exponents
+from vgyro.metrics.robust import robust_differences, robust_edf, without_outliers
+from vgyro.metrics.sampling import Sampling
 
 TAUS_PER_OCTAVE = 3
 LONGEST_TAU = 3  # the longest τ is a third of the longest segment
+LONGEST = {"overlapping": LONGEST_TAU, "modified": 4, "hadamard": 4, "robust": LONGEST_TAU}
+KINDS = tuple(LONGEST)
+LEAST_USED = 0.1  # of the differences: a τ at which losses leave fewer is left out
+SINGLE = np.array([1, 2, 4, 8])  # averaging factors that the variance of single samples is read from
 
 
 @dataclass(frozen=True)
@@ -20,6 +27,7 @@ class AllanCurve:
     """tau [M] s; deviation, low, high [M] in the unit of the rate; edf [M] equivalent degrees of freedom.
 
     exponent [M] : power of the spectrum taken at each τ for edf: 0 white, -1 flicker, -2 random walk
+    kind         : one of KINDS
     """
 
     tau: np.ndarray
@@ -29,6 +37,16 @@ class AllanCurve:
     edf: np.ndarray
     exponent: np.ndarray
     confidence: float = 0.95
+    kind: str = "overlapping"
+
+
+@dataclass(frozen=True)
+class _Series:
+    """rate [T]; edges [S + 1] of its stretches, in samples, or in slots where `slot` [T] says which are there."""
+
+    rate: np.ndarray
+    edges: np.ndarray
+    slot: np.ndarray | None = None
 
 
 def allan_deviation(
@@ -39,46 +57,120 @@ def allan_deviation(
     confidence: float = 0.95,
     engine: str = "native",
     per_octave: int = TAUS_PER_OCTAVE,
+    *,
+    sampling: Sampling | None = None,
+    kind: str = "overlapping",
 ) -> AllanCurve:
-    """Overlapping Allan deviation, chi² limits and equivalent degrees of freedom.
+    """Allan deviation from overlapping differences, chi² limits and equivalent degrees of freedom.
 
     rate       : array [T], deg/s, at a constant rate_hz within each segment
     taus       : array, s, rounded to whole samples; None: `per_octave` a factor 2, from one sample to a third of the
-                 longest segment, with τ = 1 s among them where that is a whole number of samples
+                 longest stretch (a fourth for modified and hadamard), with τ = 1 s among them where that is a whole
+                 number of samples
     segment    : array [T] int, number of the gap-free stretch of each sample; None: there is no gap
     confidence : of the limits
-    returns    : AllanCurve; σ²(τ) = Σ (θ[k+2m] - 2θ[k+m] + θ[k])² / (2τ²·n), θ the angle, the sum and n taken over all
-                 segments of at least 3τ, so no difference bridges a gap; edf adds up over the segments. A series
-                 without variance has σ = 0.
-    raises     : TooShort if no segment has three samples
-    Riley, NIST SP 1065, eq. 11 and 45; edf: Greenhall & Riley (2003), with the noise identified at each τ.
+    sampling   : instead of segment: when the samples were taken. Then differences go over the short losses within its
+                 stretches; nothing ever goes from one stretch to another
+    kind       : overlapping  the standard: σ²(τ) = Σ (θ[k+2m] - 2θ[k+m] + θ[k])² / (2τ²·n), θ the angle
+                 modified     the same of angles averaged over τ: tells white from flicker noise of the angle
+                 hadamard     third differences: a constant drift of the rate does not count
+                 robust       median instead of mean of the squared differences, without outliers (metrics.robust)
+    returns    : AllanCurve; sums and counts are taken over all stretches of at least 3τ (4τ), so no difference bridges
+                 the gap between two; edf adds up over the stretches. A series without variance has σ = 0.
+    raises     : TooShort if no stretch has three samples, or if losses leave too few differences at every τ
+    Riley, NIST SP 1065, eq. 11, 15, 19 and 45; edf: Greenhall & Riley (2003), with the noise identified at each τ.
+
+    Losses. A mean over m slots counts where nine tenths of its samples are there (below m = 10: all), as the mean of
+    these; nothing is put in the place of a lost sample. A mean of n of m samples has more noise: of single samples of
+    white noise of variance σ₁², σ₁²/n and not σ₁²/m. σ₁² is read from the shortest τ (variance of a sample about the
+    mean of 16: the sum of half the Allan variances of 1, 2, 4, 8 samples, times 16/15) and the mean of
+    σ₁²(1/n₁ + 1/n₂ - 2/m)/2 is taken off σ²(τ). So the correction is whole where the noise at τ is white; where it is
+    flicker or random walk, only the white part of it, the one that losses enlarge, is corrected. edf is that of the
+    stretches were nothing lost, times the share of the differences that there are: a lower bound, because overlapping
+    differences replace each other. A τ at which fewer than a tenth are there is left out.
     """
+    if sampling is not None and segment is not None:
+        raise ValueError("either segment or sampling")
+    if kind not in KINDS:
+        raise ValueError(f"unknown kind {kind!r}: {', '.join(KINDS)}")
     rate = np.asarray(rate, dtype=float)
-    edges = edges_of(len(rate), segment)
-    lengths, alike = np.unique(np.diff(edges), return_counts=True)
+    if kind == "robust":
+        rate, sampling = without_outliers(rate, rate_hz, sampling, segment)
+    series = _series(rate, segment, sampling)
+    lengths, alike = np.unique(np.diff(series.edges), return_counts=True)
     longest = int(lengths.max(initial=0))
-    factors = averaging_factors(rate_hz, longest, taus, per_octave)
+    factors = averaging_factors(rate_hz, longest, taus, per_octave, LONGEST[kind])
     if factors.size == 0:
         raise TooShort(
-            f"the longest gap-free stretch has {longest} samples", remedy="An Allan deviation needs 3 samples in a row"
+            f"the longest gap-free stretch has {longest} samples",
+            remedy=f"An Allan deviation ({kind}) needs {LONGEST[kind]} samples in a row",
         )
     allan = engines.get(engine).allan
-    sums, counts = allan.differences(rate, factors, edges, LONGEST_TAU)
-    exponent = noise_exponents(rate, edges, factors, allan)
+    variance, share = _variances(series, factors, allan, kind)
+    kept = share >= LEAST_USED
+    if not kept.any():
+        raise TooShort("lost samples leave too few differences at every τ", remedy="Look for a less damaged recording")
+    factors, variance, share = factors[kept], variance[kept], share[kept]
+    exponent = noise_exponents(rate, series.edges, factors, allan, series.slot)
     edf = np.empty(factors.size)
     for row, (m, alpha) in enumerate(zip(factors.tolist(), exponent.tolist(), strict=True)):
-        used = lengths >= LONGEST_TAU * m
-        edf[row] = np.sum(alike[used] * allan.degrees_of_freedom(alpha, m, lengths[used]))
-    deviation = np.sqrt(sums / counts)
+        used = lengths >= LONGEST[kind] * m
+        estimator = "overlapping" if kind == "robust" else kind
+        freedom = allan.degrees_of_freedom(alpha, m, lengths[used], estimator)
+        edf[row] = np.sum(alike[used] * freedom) * share[row]
+    if kind == "robust":
+        variance, edf = robust_edf(variance, edf, factors, longest)
+    deviation = np.sqrt(variance)
     low, high = allan.limits(deviation, edf, confidence)
-    return AllanCurve(factors / rate_hz, deviation, low, high, edf, exponent, confidence)
+    return AllanCurve(factors / rate_hz, deviation, low, high, edf, exponent, confidence, kind)
+
+
+def _series(rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None) -> _Series:
+    if sampling is None:
+        return _Series(rate, edges_of(len(rate), segment))
+    if len(sampling) != len(rate):
+        raise ValueError(f"{len(rate)} rates, but {len(sampling)} samples")
+    if sampling.missing == 0:
+        return _Series(rate, edges_of(len(rate), sampling.stretch))
+    slot, edges = sampling.slots()
+    return _Series(rate, edges, slot)
+
+
+def _variances(series: _Series, factors: np.ndarray, allan: ModuleType, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Variance at each factor, and the share of the differences there are."""
+    rate, edges, slot = series.rate, series.edges, series.slot
+    if kind == "robust":
+        return robust_differences(rate, np.arange(len(rate)) if slot is None else slot, edges, factors, LONGEST[kind])
+    if slot is None:
+        sums, counts = allan.differences(rate, factors, edges, LONGEST[kind], kind)
+        return sums / np.maximum(counts, 1), (counts > 0).astype(float)
+    sums, excess, counts, possible = allan.differences_over_losses(rate, factors, slot, edges, LONGEST[kind], kind)
+    singles, _, number, _ = allan.differences_over_losses(rate, SINGLE, slot, edges, 2)
+    single = variance_of_samples(singles / np.maximum(number, 1), number > 0)
+    some = np.maximum(counts, 1)
+    return np.maximum(sums / some - single * excess / some, 0.0), counts / np.maximum(possible, 1)
+
+
+def variance_of_samples(variance: np.ndarray, known: np.ndarray) -> float:
+    """Variance of a single sample about the mean of 16, from the Allan variances of 1, 2, 4, 8 samples.
+
+    variance, known : arrays [4]; where the longer ones are not known, about the mean of fewer
+    Each halving of a block adds half the Allan variance of its halves to the variance about the block's mean.
+    """
+    halvings = int(np.argmin(np.append(known, False)))
+    block = 2**halvings
+    return float(variance[:halvings].sum() / 2 * block / (block - 1)) if halvings else 0.0
 
 
 def averaging_factors(
-    rate_hz: float, samples: int, taus: np.ndarray | None = None, per_octave: int = TAUS_PER_OCTAVE
+    rate_hz: float,
+    samples: int,
+    taus: np.ndarray | None = None,
+    per_octave: int = TAUS_PER_OCTAVE,
+    share: int = LONGEST_TAU,
 ) -> np.ndarray:
-    """Averaging factors m (τ = m / rate_hz) for a segment of `samples`, ascending, without repeats."""
-    longest = samples // LONGEST_TAU
+    """Averaging factors m (τ = m / rate_hz), of which `share` fit into `samples`, ascending, without repeats."""
+    longest = samples // share
     if taus is None:
         # Counted from 1 s, so that recordings at different rates share their τ.
         first = np.floor(per_octave * np.log2(1 / rate_hz))

@@ -6,6 +6,8 @@ from types import ModuleType
 
 import numpy as np
 
+from vgyro.metrics.slots import SlotSums
+
 ENOUGH_FOR_AUTOCORRELATION = 30
 ENOUGH_FOR_RATIO = 3
 MOST_DIFFERENCES = 2
@@ -13,11 +15,15 @@ LARGEST_RHO = 0.25
 STEPS = (0, -1, -2)
 
 
-def noise_exponents(rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType) -> np.ndarray:
-    """Exponent of the power spectrum at each averaging factor: 2 … -2, never rising with τ.
+def noise_exponents(
+    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType, slot: np.ndarray | None = None
+) -> np.ndarray:
+    """Exponent of the power spectrum at each averaging factor: 2 … -4, never rising with τ.
 
     rate    : array [T];  edges : array [S + 1] int, first sample of each gap-free stretch, and T
     factors : array [M] int, ascending averaging factors;  allan : that module of an engine
+    slot    : array [T] int, place of each sample on an even time grid, where samples are lost within the stretches;
+              edges then count slots, and a block of m slots counts where half of its samples are there
     returns : array [M] int
     With 30 block means or more: lag-1 autocorrelation (Riley & Greenhall, "Power law noise identification using the
     lag 1 autocorrelation", EFTF 2004). With fewer: the ratio of the sample variance to the Allan variance (B1, Barnes
@@ -25,6 +31,17 @@ def noise_exponents(rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, al
     steeper one governs the longer τ, so the sequence is made monotone (isotonic regression, weight: block means):
     one chance result among many τ would else multiply its degrees of freedom by ten.
     """
+    if slot is None:
+        raw, weight = _of_whole(rate, edges, factors, allan)
+    else:
+        raw, weight = _over_losses(SlotSums.of(rate, slot, edges), factors, allan)
+    return np.round(_falling(raw, weight)).astype(np.int64)
+
+
+def _of_whole(
+    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exponent and weight at each factor, of gap-free stretches."""
     lengths = np.diff(edges)
     raw, weight = np.zeros(len(factors)), np.ones(len(factors))
     long = factors * ENOUGH_FOR_AUTOCORRELATION <= lengths.max()
@@ -40,7 +57,27 @@ def noise_exponents(rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, al
             weight[index] = means[used].sum()
         elif index:
             raw[index] = raw[index - 1]
-    return np.round(_falling(raw, weight)).astype(np.int64)
+    return raw, weight
+
+
+def _over_losses(sums: SlotSums, factors: np.ndarray, allan: ModuleType) -> tuple[np.ndarray, np.ndarray]:
+    """Exponent and weight at each factor, of runs of block means that have half of their samples."""
+    raw, weight = np.zeros(len(factors)), np.ones(len(factors))
+    for index, factor in enumerate(factors.tolist()):
+        means, edges = sums.block_means(factor)
+        lengths = np.diff(edges)
+        longest = lengths.max(initial=0)
+        if longest >= ENOUGH_FOR_AUTOCORRELATION:
+            squares, products = allan.lag_products(means, np.ones(1, np.int64), edges, ENOUGH_FOR_AUTOCORRELATION)
+            raw[index] = exponent_by_autocorrelation(squares[0], products[0])
+            weight[index] = lengths[lengths >= ENOUGH_FOR_AUTOCORRELATION].sum()
+        elif longest >= ENOUGH_FOR_RATIO:
+            used = lengths >= ENOUGH_FOR_RATIO
+            raw[index] = exponent_by_ratio(means[np.repeat(used, lengths)], lengths[used])
+            weight[index] = lengths[used].sum()
+        elif index:
+            raw[index] = raw[index - 1]
+    return raw, weight
 
 
 def _falling(values: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -71,6 +71,16 @@ class Sampling:
         steps = np.diff(self.position)
         return int(np.sum(steps[np.diff(self.stretch) == 0] - 1))
 
+    def slots(self) -> tuple[np.ndarray, np.ndarray]:
+        """Slot of each sample, int64 [T], the stretches one after another, and the first slot of each stretch [S + 1].
+
+        The last of the edges is one past the last slot; what lay between two stretches is left out.
+        """
+        first = np.flatnonzero(np.diff(self.stretch, prepend=self.stretch[:1] - 1))
+        last = np.append(first[1:], len(self)) - 1
+        edges = np.concatenate([[0], np.cumsum(self.position[last] - self.position[first] + 1)])
+        return self.position + np.repeat(edges[:-1] - self.position[first], last - first + 1), edges
+
     def without(self, mask: np.ndarray) -> Sampling:
         """The samples that `mask` [T] does not mark; where that leaves a long loss, the stretch ends there."""
         kept = ~np.asarray(mask, dtype=bool)
