@@ -112,7 +112,7 @@ def _delay(frequency: np.ndarray, gain: np.ndarray, highest: float) -> float:
 def _bandwidths(frequency: np.ndarray, power: np.ndarray, highest: float) -> tuple[float, float]:
     """-3 dB bandwidth and noise-equivalent bandwidth, Hz, of a power gain that is 1 at frequency 0; NaN without one.
 
-    Medians of NEIGHBOURS gains are used: of a smooth fall they are the gains, and a method that adapts itself adds noise.
+    Medians of NEIGHBOURS gains are used: of a smooth fall they are the gains; a method that adapts itself adds noise.
     Between the frequencies a cubic spline of the logarithms, below the lowest a parabola, above the highest a constant.
     """
     from scipy.interpolate import CubicSpline
