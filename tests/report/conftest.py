@@ -25,6 +25,8 @@ METHODS = (
     ("dcc_causal", "level", "DCC weights, causal", True),
     ("dcc_causal", "residual", "DCC weights, causal", True),
 )
+MOVED = "dcc_causal[level]"
+ADDED_RATE = 0.05
 GAIN = {
     "average": 1.9,
     "median": 2.4,
@@ -112,21 +114,60 @@ def integrity(name: str) -> dict[str, Any]:
     }
 
 
+def figure(value: float | None, spread: float, unit: str, floor: float | None = None, note: str = "") -> dict[str, Any]:
+    """A figure of calibration.json. value None: below the floor"""
+    if value is None:
+        return {"value": None, "low": 0.0, "high": spread, "unit": unit, "floor": floor, "state": "below the floor",
+                "note": note}  # fmt: skip
+    limits = {"value": value, "low": value - spread, "high": value + spread}
+    return {**limits, "unit": unit, "floor": floor, "state": "value", "note": note}
+
+
+def missing(unit: str, note: str) -> dict[str, Any]:
+    """A figure that was not measured."""
+    return {**dict.fromkeys(("value", "low", "high", "floor")), "unit": unit, "state": "not measured", "note": note}
+
+
 def calibration() -> dict[str, Any]:
     points = [
-        {"rate": 50.0 * k, "mean_count": 5000.0 * k + 20, "residual_deg_s": 0.002 * (-1) ** k} for k in range(-6, 7)
-    ]
+        {"rate": 50.0 * k, "mean_count": 5000.0 * k + 20, "residual_deg_s": 0.002 * (-1) ** k + (0.001 if up else 0),
+         "recording": "cal", "direction": "up" if up else "down", "temperature_c": 25.0,
+         "standard_error_deg_s": 0.0008}
+        for up in (True, False) for k in range(-6, 7)
+    ]  # fmt: skip
+    temperature = {
+        "sensor": "board", "reference_c": 25.0, "low_c": 15.0, "high_c": 45.0, "scale_slope": -4e-4,
+        "bias": [20.1, 0.8, 0.01, -0.0002], "bias_covariance": np.eye(4).tolist(), "applied": True, "note": "",
+        "points": [{"temperature_c": t, "bias": 20 + 0.8 * (t - 25), "recording": "warm"} for t in (15.0, 30.0, 45.0)],
+    }  # fmt: skip
+    figures = {
+        "nonlinearity_full_scale": figure(210.0, 30.0, "ppm", 160.0),
+        "nonlinearity_reading": figure(None, 720.0, "ppm", 640.0),
+        "asymmetry": figure(None, 95.0, "ppm", 80.0) | {"low": -15.0},
+        "repeatability": figure(31.0, 12.0, "ppm", 9.0, "of 3 power cycles only"),
+        "scale_temperature": figure(-400.0, 12.0, "ppm/K"),
+        "self_heating": missing("deg/h", "no recording begins at switch-on"),
+        "cross_axis": missing("%", "no calibration about another axis"),
+    }
     measured = {
-        "source": "measured", "scale": 0.0100123, "scale_low": 0.0100119, "scale_high": 0.0100127, "bias": 20.1,
-        "bias_low": 19.8, "bias_high": 20.4, "note": "", "nonlinearity_ppm": 210.0,
-        "floor_ppm": 160.0, "points": points,
+        "source": "measured", "recording": "cal", "scale": 0.0100123, "scale_low": 0.0100119,
+        "scale_high": 0.0100127, "bias": 20.1, "bias_low": 19.8, "bias_high": 20.4, "note": "",
+        "nonlinearity_ppm": 210.0, "floor_ppm": 160.0, "points": points, "figures": figures, "temperature": temperature,
     }  # fmt: skip
     nominal = {
         "source": "nominal", "scale": 0.01, "scale_low": None, "scale_high": None, "bias": 0.0, "bias_low": None,
-        "bias_high": None, "nonlinearity_ppm": None, "floor_ppm": None, "points": [],
-        "note": "nominal scale: no calibration recording",
+        "bias_high": None, "nonlinearity_ppm": None, "floor_ppm": None, "points": [], "figures": {},
+        "temperature": None, "note": "nominal scale: no calibration recording",
     }  # fmt: skip
-    return {"gyros": {**dict.fromkeys(GYROS, measured), "solo": nominal}}
+    cold = {**measured, "temperature": None, "figures": {
+        **figures, "repeatability": missing("ppm", "one recording only"),
+        "scale_temperature": missing("ppm/K", "one temperature only"),
+    }}  # fmt: skip
+    test = {
+        "recordings": ["cal"], "rates": 26, "full_scale": 300.0, "seconds_a_point": 20.0, "whole_turns": True,
+        "earth_rate_deg_s": 0.0029, "temperature_c": [15.0, 45.0], "standard": "IEEE Std 1431-2004",
+    }  # fmt: skip
+    return {"gyros": {**dict.fromkeys(GYROS, measured), "g4": cold, "solo": nominal}, "test": {"x": test}}
 
 
 def build(folder: Path, failed_check: bool = False, simulated: bool = True) -> Task:
@@ -153,7 +194,7 @@ def build(folder: Path, failed_check: bool = False, simulated: bool = True) -> T
         "dataset": DATASET,
         "manifest": manifest(simulated),
         "board": board(),
-        "analysis": {"metrics": {"welch_s": 100.0}},
+        "analysis": {"metrics": {"welch_s": 100.0, "confidence": 0.95}, "calibration": {"confidence": 0.95}},
     }
     return Task(inputs, outputs, options, "code")
 
@@ -183,16 +224,14 @@ def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...]
     level |= {column: 0.05 / GAIN.get(column.split("[")[0], 2.0) for column in columns}
     _write_curves(folder, level)
     _write_metrics(folder, recording, axis, gyros, fused, level)
-    methods: dict[str, Any] = {
-        name: [] for name in ("method", "definition", "column", "title", "source", "causal", "note")
-    }
+    words = ("method", "definition", "column", "title", "source", "causal", "note", "response", "moved")
+    methods: dict[str, Any] = {name: [] for name in words}
     for (name, definition, title, causal), column in zip(fused, columns, strict=True):
         lost = name == "inverse_variance_rrw"
         note = "no RRW was found for g1" if lost else ""
-        row = (name, definition, "" if lost else column, title, "paper <eq. 1>", causal, note)
-        for key, value in zip(
-            ("method", "definition", "column", "title", "source", "causal", "note"), row, strict=True
-        ):
+        moved = "" if lost else column if column == MOVED else "the same at any constant rate: weights add up to one"
+        row = (name, definition, "" if lost else column, title, "paper <eq. 1>", causal, note, "analytic", moved)
+        for key, value in zip(words, row, strict=True):
             methods[key].append(value)
     filtered = np.array([name == "jiang_random_walk" for name, *_ in fused], dtype=bool)
     figures = {"dc_gain": 1.0, "bandwidth_hz": 1.05, "noise_bandwidth_hz": 1.65, "delay_s": 0.15}
@@ -221,7 +260,9 @@ def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...]
         "difference": [1e-7, 0.0, -0.01 if failed_check else 0.0],
         "tolerance": [1e-4] * checks, "unit": ["1", "1", "deg/s"], "passed": [True, True, not failed_check],
     }, "crosscheck", PROVENANCE)  # fmt: skip
+    _write_noise_in_common(folder, gyros)
     if recording == "rest":
+        _write_effects(folder, gyros)
         for definition in ("level", "residual"):
             _write_volatility(folder / definition, gyros)
 
@@ -229,14 +270,16 @@ def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...]
 def _write_curves(folder: Path, level: dict[str, float]) -> None:
     tau = 0.02 * 2.0 ** (np.arange(42) / 3)
     frequency = np.geomspace(0.01, 25, 800)
-    rows: dict[str, list[Any]] = {name: [] for name in ("series", "tau", "deviation", "low", "high", "edf")}
+    rows: dict[str, list[Any]] = {name: [] for name in ("series", "kind", "tau", "deviation", "low", "high", "edf")}
     spectra: dict[str, list[Any]] = {name: [] for name in ("series", "frequency", "density")}
     for name, n in level.items():
         sigma = np.sqrt(n**2 / tau * 0.02 + (0.001 + 0.02 * n) ** 2 + (0.0001) ** 2 * tau / 3)
         spread = 0.01 + 0.5 * tau / tau[-1]
-        values = (np.full(len(tau), name), tau, sigma, sigma / (1 + spread), sigma * (1 + spread), 2 / spread**2)
-        for key, value in zip(rows, values, strict=True):
-            rows[key].extend(value.tolist())
+        for kind in ("overlapping", "robust") if name in GYROS else ("overlapping",):
+            words = (np.full(len(tau), name), np.full(len(tau), kind))
+            values = (*words, tau, sigma, sigma / (1 + spread), sigma * (1 + spread), 2 / spread**2)
+            for key, value in zip(rows, values, strict=True):
+                rows[key].extend(value.tolist())
         density = n * np.sqrt(0.04) * np.sqrt(1 + 0.1 / frequency)
         for key, value in zip(spectra, (np.full(len(frequency), name), frequency, density), strict=True):
             spectra[key].extend(value.tolist())
@@ -250,53 +293,102 @@ def _write_metrics(
     rows: list[tuple[Any, ...]] = []
 
     def add(
-        method: str, definition: str, metric: str, value: float, unit: str, note: str = "", spread: float = 0.03
-    ) -> None:
-        rows.append(
-            (recording, axis, method, definition, metric, value, value * (1 - spread), value * (1 + spread), unit, note)
-        )
+        method: str, definition: str, metric: str, value: float, unit: str, note: str = "", spread: float = 0.03,
+        true_rate: float = 0.0,
+    ) -> None:  # fmt: skip
+        limits = (value, value * (1 - spread), value * (1 + spread))
+        rows.append((recording, axis, method, definition, true_rate, metric, *limits, unit, note))
 
     series = [(name, "", name) for name in gyros]
     series += [(name, d, f"{name}[{d}]" if d else name) for name, d, *_ in methods if name != "inverse_variance_rrw"]
     for method, definition, column in series:
         n = level[column]
+        filtered = "jiang" in method
+        for name, value in (("missing", 25.0), ("outliers", 3.0 if method == "g1" else 0.0), ("clipped", 0.0)):
+            add(method, definition, name, value, "1", "", 0.0)
+        add(method, definition, "mean", 0.001, "deg/s")
         add(method, definition, "sigma", n, "deg/s", "bootstrap of blocks of 20 s")
+        add(method, definition, "sigma_equal", 0.2 * n, "deg/s", "low-passed to 1.05 Hz")
+        add(method, definition, "noise_density", n * 0.14, "deg/s/√Hz", "two-sided, 1 to 20 Hz")
         add(method, definition, "arw", 60 * n * 0.14, "deg/√h")
-        add(method, definition, "arw_1s", 60 * n * 0.14, "deg/√h", "band-limited: 0.88" if "jiang" in method else "")
+        add(method, definition, "density_ratio", 1.002, "1", "", 0.004)
+        add(method, definition, "arw_1s", 60 * n * 0.14, "deg/√h", "band-limited: 0.88" if filtered else "")
         drift = "the curve still falls at its end: an upper limit of the floor" if method in {"g1", "g2"} else ""
         add(method, definition, "bias_drift", 360 * n, "deg/h", drift, 0.2)
         rows.append(
-            (recording, axis, method, definition, "rrw", 5.0, 0.0, 31.2, "deg/h/√h", "not shown to exist: < 31.2")
+            (recording, axis, method, definition, 0.0, "rrw", 5.0, 0.0, 31.2, "deg/h/√h", "not shown to exist: < 31.2")
         )
+        add(method, definition, "angle_drift_60s", 3 * n, "deg")
+        add(method, definition, "angle_bound_60s", 3.1 * n, "deg")
         if method not in gyros:
             unsure = method == "median"
             factor = 0.0775 / n
             note = "not significant" if unsure else ""
+            add(method, definition, "if_sigma_equal", factor * (0.7 if filtered else 1), "1", "", 0.02)
             add(method, definition, "if_sigma", factor, "1", "", 0.02)
             add(method, definition, "if_bias_drift", 1.1 if unsure else factor, "1", note, 0.3)
+        if recording == "rest" and column == MOVED:
+            for metric, value, unit in (
+                ("mean", -0.024, "deg/s"),
+                ("sigma", 1.1 * n, "deg/s"),
+                ("arw", 9 * n, "deg/√h"),
+            ):
+                add(method, definition, metric, value, unit, true_rate=ADDED_RATE)
+            add(method, definition, "bias_drift", 1800 * n, "deg/h", "", 0.2, ADDED_RATE)
         if recording == "sine":
             add(method, definition, "error_sigma", n, "deg/s")
+            nothing = (np.nan, np.nan, np.nan)
             rows.append(
-                (
-                    recording,
-                    axis,
-                    method,
-                    definition,
-                    "delay",
-                    np.nan,
-                    np.nan,
-                    np.nan,
-                    "s",
-                    "the reference does not change",
-                )
+                (recording, axis, method, definition, 0.0, "delay", *nothing, "s", "the reference does not change")
             )
-    names = ("recording", "axis", "method", "definition", "metric", "value", "low", "high", "unit", "note")
+    names = (
+        "recording", "axis", "method", "definition", "true_rate", "metric", "value", "low", "high", "unit", "note",
+    )  # fmt: skip
     write_table(
         folder / "metrics.parquet",
         {name: [row[i] for row in rows] for i, name in enumerate(names)},
         "metrics",
         PROVENANCE,
     )
+
+
+def _write_noise_in_common(folder: Path, gyros: tuple[str, ...]) -> None:
+    """A tone that g1 and g3 share, one of g2; Allan correlation that only g1 and g2 have."""
+    tones = [
+        (6.5, "g1", "g1, g3"), (6.5, "g3", "g1, g3"), (12.25, "g2", "g2"),
+    ]  # fmt: skip
+    tones = [row for row in tones if row[1] in gyros]
+    amplitude = np.array([0.01 * (place + 1) for place in range(len(tones))])
+    write_table(folder / "tones.parquet", {
+        "gyro": np.array([gyro for _, gyro, _ in tones], dtype=str),
+        "frequency": np.array([frequency for frequency, _, _ in tones], dtype=float),
+        "amplitude": amplitude, "low": 0.9 * amplitude, "high": 1.1 * amplitude,
+        "probability": np.full(len(tones), 1e-5),
+        "shared": np.array([shared for _, _, shared in tones], dtype=str),
+    }, "tones", PROVENANCE)  # fmt: skip
+    tau = np.geomspace(1, 300, 12)
+    pairs = [(first, second) for place, first in enumerate(gyros) for second in gyros[place:]]
+    value = [1.0 if a == b else 0.4 if {a, b} == {"g1", "g2"} else 0.0 for a, b in pairs]
+    correlation = np.repeat(value, len(tau))
+    width = np.tile(np.linspace(0.02, 0.3, len(tau)), len(pairs))
+    write_table(folder / "cross_allan.parquet", {
+        "gyro": np.repeat([a for a, _ in pairs], len(tau)), "other": np.repeat([b for _, b in pairs], len(tau)),
+        "tau": np.tile(tau, len(pairs)), "covariance": 1e-4 * correlation, "correlation": correlation,
+        "low": correlation - width, "high": correlation + width,
+    }, "cross_allan", PROVENANCE)  # fmt: skip
+
+
+def _write_effects(folder: Path, gyros: tuple[str, ...]) -> None:
+    known = {"g1": "tone", "g2": "drift", "g3": "tone", "g4": "heteroskedastic + drift"}
+    verdict = [known.get(gyro, "nothing") for gyro in gyros]
+    empty = np.full(len(gyros), np.nan)
+    tone = np.where(np.isin(verdict, "tone"), 6.5, np.nan)
+    write_table(folder / "effects.parquet", {
+        "gyro": gyros, "verdict": verdict, "sentence": [f"{word}: made up <here>" for word in verdict],
+        "p_level": np.zeros(len(gyros)), "p_detrended": empty, "p_whitened": empty, "p_standardised": empty,
+        "kurtosis": np.full(len(gyros), 3.1), "tone_frequency": tone, "tone_amplitude": 0.001 * tone,
+        "tone_seen_at": tone % 1,
+    }, "effects", PROVENANCE)  # fmt: skip
 
 
 def _write_volatility(folder: Path, gyros: tuple[str, ...]) -> None:
@@ -310,7 +402,12 @@ def _write_volatility(folder: Path, gyros: tuple[str, ...]) -> None:
         k: [] for k in ("gyro", "series", "lags", "samples", "statistic", "p_value", "kurtosis", "status")
     }
     for gyro in gyros:
-        for series, statistic, p in (("level", 420.0, 0.0), ("detrended", 1.2, 0.27), ("standardised", 0.4, 0.53)):
+        for series, statistic, p in (
+            ("level", 420.0, 0.0),
+            ("detrended", 1.2, 0.27),
+            ("whitened", 0.7, 0.4),
+            ("standardised", 0.4, 0.53),
+        ):
             flat = gyro == "g3" and series == "standardised"
             row = (
                 gyro,

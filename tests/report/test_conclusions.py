@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.report.conclusions import bad_gyros, best_method, conclude
+from vgyro.report.best import best_method, best_of_all
+from vgyro.report.conclusions import bad_gyros, conclude
 from vgyro.report.model import ArrayPart, DatasetPart
+from vgyro.report.moved import failing
 from vgyro.tasks.common import Task
 from vgyro.tasks.report import read_dataset_part
 
@@ -106,10 +108,40 @@ def test_arw_has_the_tighter_rule(dataset: DatasetPart, arw: float, bad: bool) -
     assert found == (["g4"] if bad else [])
 
 
-def test_the_best_method_and_the_best_of_full_bandwidth(dataset: DatasetPart) -> None:
+def test_the_best_method_is_that_at_equal_bandwidth(dataset: DatasetPart) -> None:
     array = array_of(dataset)
+    # Raw 1σ favours the low-pass (3.4 against 2.9); at equal bandwidth it has 0.7 of that, less than DCC.
     assert best_method(array, "if_sigma").method == "jiang_random_walk"
-    assert best_method(array, "if_sigma", full_bandwidth=True).method == "dcc_causal", "not dcc_in_sample"
+    assert best_method(array, "if_sigma_equal").method == "dcc_causal", "not dcc_in_sample"
+
+
+def test_the_headline_is_a_method_that_holds_at_the_added_rate(dataset: DatasetPart) -> None:
+    # DCC by `level` and by `residual` are equal at rest; the mean of the first is half the added rate off.
+    best = best_of_all(array_of(dataset))
+    assert (best.name, best.figure) == (("dcc_causal", "residual"), "if_sigma_equal")
+
+
+def test_a_method_that_wins_at_rest_and_fails_at_the_rate_is_named_with_its_figures(dataset: DatasetPart) -> None:
+    (sentence,) = [one for one in conclude(dataset) if "fails at 0.05 deg/s (axis x" in one.text]
+    assert sentence.tone == "warn"
+    assert sentence.text.startswith("DCC weights, causal (level) improves 1σ")
+    # 1σ is 1.1 times that at rest, below the rule's 1.5; the mean moves by 0.025, half the rate.
+    assert "Mean −0.0240 deg/s, at rest 0.00100" in sentence.text
+    assert "Bias drift, min σ" in sentence.text
+    assert "1σ 0." not in sentence.text
+
+
+@pytest.mark.parametrize(("mean", "fails"), [(0.0055, False), (0.0065, True)])
+def test_a_mean_that_moves_by_more_than_a_tenth_of_the_rate_fails(
+    dataset: DatasetPart, mean: float, fails: bool
+) -> None:
+    array = array_of(dataset)
+    table = {name: column.copy() for name, column in array.tables["metrics"].items()}
+    moved = table["true_rate"] != 0
+    table["value"][moved & (table["metric"] == "mean")] = mean  # 0.001 at rest, the rate is 0.05
+    table["value"][moved & (table["metric"] != "mean")] = 0.0
+    found = failing(replace(array, tables={**array.tables, "metrics": table}))
+    assert (("dcc_causal", "level") in found) is fails
 
 
 def test_causal_dcc_wins_only_with_its_whole_interval(dataset: DatasetPart) -> None:
@@ -127,5 +159,9 @@ def test_limits_are_said(dataset: DatasetPart) -> None:
     assert "rest lacks 0.49\u2009% of its frames" in text
 
 
-def test_drift_is_not_called_arch(dataset: DatasetPart) -> None:
-    assert any("5 of 5 gyros; detrended: 0; it is drift" in one.text for one in conclude(dataset))
+def test_arch_verdicts_are_said_together(dataset: DatasetPart) -> None:
+    texts = [one.text for one in conclude(dataset) if one.text.startswith("ARCH")]
+    assert texts == [
+        "ARCH effects of the level (axis x, rest): tone: g1, g3; drift: g2; heteroskedastic + drift: g4.",
+        "ARCH effects of the level (axis z, rest): nothing: solo.",
+    ]

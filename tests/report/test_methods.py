@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vgyro.report.methods import dynamic_table, rest_table
+from vgyro.report.methods import dynamic_table, response_table, rest_tables
 from vgyro.report.model import ArrayPart, DatasetPart
+from vgyro.report.moved import moved_table
 from vgyro.tasks.common import Task
 from vgyro.tasks.report import read_dataset_part
 
@@ -31,7 +33,7 @@ def array_of(dataset: DatasetPart, anchor: str) -> ArrayPart:
 
 def test_a_recording_in_motion_has_one_table_with_its_factors(dataset: DatasetPart) -> None:
     moving = without(array_of(dataset, "sine-x"), ["sigma"])
-    assert rest_table(dataset, moving) == ""
+    assert rest_tables(dataset, moving) == ""
     html = dynamic_table(dataset, moving)
     assert "Errors against the reference rate" in html
     assert "IF of 1σ" in html
@@ -40,21 +42,68 @@ def test_a_recording_in_motion_has_one_table_with_its_factors(dataset: DatasetPa
 def test_a_recording_at_rest_has_no_errors(dataset: DatasetPart) -> None:
     array = array_of(dataset, "rest-x")
     assert dynamic_table(dataset, array) == ""
-    html = rest_table(dataset, array)
-    # The low-pass's own figures, and that the others do not limit the bandwidth.
-    assert ">1.05<" in html
-    assert "not limited" in html
+    html = rest_tables(dataset, array)
     # K touches zero: an upper limit, not a figure.
     assert "&lt; 31" in html
 
 
+def test_the_static_figures_are_in_three_tables_and_the_gyros_have_no_factors(dataset: DatasetPart) -> None:
+    html = rest_tables(dataset, array_of(dataset, "rest-x"))
+    tables = html.split("<table")[1:]
+    titles = [re.search("<caption>(.*?) at rest", table).group(1) for table in tables]
+    assert titles == ["Improvement", "Accuracy", "Noise coefficients"]
+    assert [">g1<" in table for table in tables] == [False, True, True]
+    # Figures that no series has make no column: bias_instability and rate_ramp are not in the artefacts.
+    assert "Bias instability" not in html
+
+
+def test_a_reading_that_a_low_pass_lowers_is_marked_where_it_stands(dataset: DatasetPart) -> None:
+    html = rest_tables(dataset, array_of(dataset, "rest-x"))
+    marked = [row for row in html.split("<tr") if '<span class="mark">band-limited' in row]
+    assert [re.search(r'scope="row"[^>]*>([^<]*)', row).group(1) for row in marked] == ["Jiang 2012, random walk"]
+    assert "N is fitted with the filter" in html
+
+
+def test_what_was_left_out_and_how_a_method_answers(dataset: DatasetPart) -> None:
+    html = response_table(dataset, array_of(dataset, "rest-x"))
+    # The low-pass's own figures, and that the others do not limit the bandwidth.
+    assert ">1.05<" in html
+    assert "not limited" in html
+    gyro = re.search(r">g1</th>(.*?)</tr>", html, re.S).group(1)
+    assert re.findall(r">(\d+)<", gyro) == ["25", "3", "0"]
+
+
+def test_figures_at_the_added_rate_stand_beside_those_at_rest_and_nowhere_else(dataset: DatasetPart) -> None:
+    array = array_of(dataset, "rest-x")
+    key = ("dcc_causal", "level")
+    assert array.added_rate == 0.05
+    assert (array.values()[key]["mean"].value, array.moved_values()[key]["mean"].value) == (0.001, -0.024)
+    html = moved_table(dataset, array)
+    assert html.count("at 0.05 deg/s</th>") == 4
+    row = re.search(r">DCC weights, causal<.*?</tr>", html, re.S).group(0)
+    # Mean and bias drift fail by the rule; 1σ is 1.1 times that at rest, N about 1.07 times.
+    assert row.count('class="number bad"') == 2
+    assert "DCC weights, causal (residual): the same at any constant rate" in html
+    assert "\u22120.024" not in rest_tables(dataset, array)
+
+
+def test_a_recording_at_a_constant_rate_shows_its_own_figures(dataset: DatasetPart) -> None:
+    array = array_of(dataset, "rest-x")
+    table = {**array.tables["metrics"]}
+    table["true_rate"] = np.full(len(table["true_rate"]), 30.0)
+    turning = replace(array, kind="constant", tables={**array.tables, "metrics": table})
+    assert turning.moved_values() == {}
+    assert turning.added_rate == 0
+    assert turning.values()["g1", ""]["sigma"].value == 0.05
+
+
 def test_a_factor_whose_interval_holds_one_is_grey(dataset: DatasetPart) -> None:
-    html = rest_table(dataset, array_of(dataset, "rest-x"))
+    html = rest_tables(dataset, array_of(dataset, "rest-x"))
     assert '<td class="number muted" title="not significant">1.10' in html
 
 
 def test_one_gyro_has_a_table_without_methods(dataset: DatasetPart) -> None:
-    html = rest_table(dataset, array_of(dataset, "rest-z"))
+    html = rest_tables(dataset, array_of(dataset, "rest-z"))
     assert "solo" in html
     assert "Methods" not in html
     assert "Improvement factor" not in html

@@ -7,47 +7,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.report.arch import verdicts
+from vgyro.report.best import motion_sentences, rest_sentences
 from vgyro.report.crosscheck import failures
 from vgyro.report.fits import NO_USE
-from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, Value, rows_of
-from vgyro.report.noise import method_labels
+from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, rows_of
+from vgyro.report.noise import OVERLAPPING
 from vgyro.report.numbers import percent, significant
 from vgyro.report.scale import nominal
-from vgyro.report.tables import Tone
-from vgyro.report.volatility import LEVEL_OF_TEST
+from vgyro.report.sentences import Conclusion, named
 
 BAD_FACTOR = 2.0
 BAD_ARW_FACTOR = 1.5
 FEWEST_GYROS = 3
 SHORTEST_TAU = 1.0
-MOST_NAMED = 6
-SIMPLE = ("average", "median", "inverse_variance_arw")
 MOST_LOST = 1e-3
 MOST_UNFITTED = 0.01
 AT_REST_KINDS = ("static", "thermal", "free")
-REST_FACTORS = (("if_sigma", "1σ"), ("if_bias_drift", "bias drift"))
-IN_SAMPLE = "_in_sample"
 STILL_FALLS = "the curve still falls"
 BAD_RULE = (
     f"A gyro is called bad where, at rest, its 1σ or its Allan deviation at {SHORTEST_TAU:g} s or longer is more than "
     f"{BAD_FACTOR:g} times the median of its array, or its ARW read at 1 s more than {BAD_ARW_FACTOR:g} times "
     f"({FEWEST_GYROS} gyros or more); the lower 95 % limit counts."
 )
-BEST_RULE = (
-    "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording "
-    "at rest; in-sample weights are left out, because they have seen what they weigh. DCC beats the simple baselines "
-    "(average, median, fixed inverse variance) where the lower limit of its factor is above the best of theirs."
-)
-ARCH_RULE = "ARCH of the level is called drift where the detrended series does not reject at 5 %."
-
-
-@dataclass(frozen=True)
-class Conclusion:
-    """One sentence. anchor : part of the page that it rests on"""
-
-    text: str
-    tone: Tone = ""
-    anchor: str = ""
 
 
 @dataclass(frozen=True)
@@ -61,23 +43,12 @@ class BadGyro:
     factor: float
 
 
-@dataclass(frozen=True)
-class Best:
-    """Best method of an array by one improvement factor."""
-
-    label: str
-    method: str
-    factor: Value
-    axis: str
-    recording: str
-
-
 def conclude(dataset: DatasetPart) -> list[Conclusion]:
     """All sentences, the most important first."""
     found = _gyro_sentences(dataset)
     for array in main_arrays(dataset):
-        found += _rest_sentences(array)
-    found += _motion_sentences(dataset)
+        found += rest_sentences(dataset, array)
+    found += motion_sentences(dataset)
     found += _arch_sentences(dataset)
     return found + limits(dataset)
 
@@ -124,6 +95,8 @@ def _by_curve(array: ArrayPart) -> list[BadGyro]:
     curves: dict[float, dict[str, tuple[float, float]]] = {}
     for row in rows_of(array.tables.get("allan", {})):
         # The τ nearest to 1 s may lie a little below it.
+        if row["kind"] != OVERLAPPING:
+            continue
         if row["series"] in array.gyros and row["tau"] > 0.9 * SHORTEST_TAU and np.isfinite(row["deviation"]):
             curves.setdefault(float(row["tau"]), {})[str(row["series"])] = (float(row["deviation"]), float(row["low"]))
     return [
@@ -141,27 +114,6 @@ def _above(array: ArrayPart, words: str, limit: float, known: dict[str, tuple[fl
         for gyro, (value, low) in known.items()
         if median > 0 and low > limit * median
     ]
-
-
-def best_method(array: ArrayPart, metric: str, *, full_bandwidth: bool = False) -> Best | None:
-    """The method, not in-sample, with the greatest improvement factor.
-
-    full_bandwidth : of those that do not narrow the bandwidth
-    """
-    labels = _labels(array)
-    limited = {(row["method"], row["definition"]) for row in array.methods() if np.isfinite(row["bandwidth_hz"])}
-    found = [
-        Best(labels[name], name[0], known[metric], array.axis, array.recording)
-        for name, known in array.values().items()
-        if name in labels and metric in known and known[metric].known
-        if not name[0].endswith(IN_SAMPLE) and not (full_bandwidth and name in limited)
-    ]
-    return max(found, key=lambda best: best.factor.value, default=None)
-
-
-def _labels(array: ArrayPart) -> dict[tuple[str, str], str]:
-    names = method_labels(array)
-    return {(row["method"], row["definition"]): names[row["column"]] for row in array.methods() if row["column"]}
 
 
 def _gyro_sentences(dataset: DatasetPart) -> list[Conclusion]:
@@ -183,102 +135,17 @@ def _gyro_sentences(dataset: DatasetPart) -> list[Conclusion]:
     return found
 
 
-def _rest_sentences(array: ArrayPart) -> list[Conclusion]:
-    place = f"axis {array.axis}, {array.recording}"
-    parts = []
-    for metric, words in REST_FACTORS:
-        best = best_method(array, metric)
-        if best is not None:
-            parts.append(f"by {words} {best.label}, improvement factor {_factor(best.factor)}")
-            free = best_method(array, metric, full_bandwidth=True)
-            if free is not None and free.label != best.label:
-                parts[-1] += f" (without narrowing the bandwidth: {free.label}, {_factor(free.factor)})"
-    if not parts:
-        return []
-    found = [Conclusion(f"Best method at rest ({place}): {'; '.join(parts)}.", "", array.anchor)]
-    compared = [text for metric, words in REST_FACTORS if (text := _dcc_words(array, metric, words))]
-    if compared:
-        found.append(Conclusion(f"Causal DCC ({place}) {'; '.join(compared)}.", "", array.anchor))
-    return found
-
-
-def _factor(value: Value) -> str:
-    holds_one = value.low <= 1 <= value.high
-    return interval(value) + (", not significant: the interval holds 1" if holds_one else "")
-
-
-def named(gyros: list[str]) -> str:
-    """Names, or how many where they are too many to read."""
-    return ", ".join(gyros) if len(gyros) <= MOST_NAMED else f"{len(gyros)} gyros"
-
-
-def interval(value: Value) -> str:
-    """A figure and its interval in one line."""
-    text = significant(value.value)
-    if np.isfinite(value.low) and np.isfinite(value.high):
-        text += f" ({significant(value.low)} … {significant(value.high)})"
-    return text
-
-
-def _dcc_words(array: ArrayPart, metric: str, words: str) -> str:
-    labels = _labels(array)
-    known = {
-        name: values[metric]
-        for name, values in array.values().items()
-        if name in labels and metric in values and values[metric].known
-    }
-    simple = [name for name in known if name[0] in SIMPLE]
-    dcc = [name for name in known if name[0] == "dcc_causal"]
-    if not simple or not dcc:
-        return ""
-    baseline = max(simple, key=lambda name: known[name].value)
-    ours = max(dcc, key=lambda name: known[name].value)
-    verdict = "beats" if known[ours].low > known[baseline].value else "does not beat"
-    figures = f"{interval(known[ours])} with definition {ours[1]} against {significant(known[baseline].value)}"
-    return f"{verdict} the simple baselines by {words}: {figures} of {labels[baseline]}"
-
-
-def _motion_sentences(dataset: DatasetPart) -> list[Conclusion]:
-    found = []
-    for array in dataset.arrays:
-        labels = _labels(array)
-        errors = {
-            name: values["error_sigma"]
-            for name, values in array.values().items()
-            if name in labels and "error_sigma" in values and values["error_sigma"].known
-        }
-        if errors:
-            best = min(errors, key=lambda name: errors[name].value)
-            text = (
-                f"In motion (axis {array.axis}, {array.recording}) the least error 1σ is {interval(errors[best])} deg/s"
-            )
-            against = (
-                f", against {significant(errors['average', ''].value)} of the average"
-                if ("average", "") in errors
-                else ""
-            )
-            found.append(Conclusion(f"{text}, by {labels[best]}{against}.", "", array.anchor))
-    return found
-
-
 def _arch_sentences(dataset: DatasetPart) -> list[Conclusion]:
+    """What the ARCH effects of each array at rest are, gyros of one verdict together."""
     found = []
-    for recording in dataset.recordings:
-        raw: list[str] = []
-        left: list[str] = []
-        tested = 0
-        for array in recording.arrays:
-            level = array.volatility.get("level")
-            for row in rows_of(level.arch_lm or {}) if level else ():
-                if row["status"] == "ok":
-                    rejects = row["p_value"] < LEVEL_OF_TEST
-                    tested += row["series"] == "level"
-                    raw += [row["gyro"]] if rejects and row["series"] == "level" else []
-                    left += [row["gyro"]] if rejects and row["series"] == "detrended" else []
-        if raw:
-            verdict = "it is drift" if not left else f"it is more than drift for {named(left)}"
-            text = f"ARCH effect of the level in {recording.name}: {len(raw)} of {tested} gyros; detrended: {len(left)}"
-            found.append(Conclusion(f"{text}; {verdict}.", "", recording.arrays[0].anchor))
+    for array in at_rest(dataset):
+        groups: dict[str, list[str]] = {}
+        for gyro, verdict in verdicts(array).items():
+            groups.setdefault(verdict, []).append(gyro)
+        if groups:
+            listed = "; ".join(f"{verdict}: {named(gyros)}" for verdict, gyros in groups.items())
+            text = f"ARCH effects of the level (axis {array.axis}, {array.recording}): {listed}."
+            found.append(Conclusion(text, "", array.anchor))
     return found
 
 

@@ -2,32 +2,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from markupsafe import Markup
 
 from vgyro.report.html import definitions, details, join, paragraph
 from vgyro.report.model import DatasetPart, Figure, Record
+from vgyro.report.numbers import percent, plain
 from vgyro.report.tables import Cell, Column, render_table
 
 CONVENTIONS = (
     ("Allan model", "σ² = 3Q²/τ² + N²/τ + (2 ln2/π)B² + K²τ/3 + R²τ²/2, τ in s, rate in deg/s; overlapping estimator"),
     ("spectrum", "two-sided: N², B²/(2πf), K²/(2πf)²; a one-sided Welch density is √2 larger, and plots show that one"),
     ("ARW, N", "N [deg/√h] = 60·N [deg/s/√Hz, two-sided]; “read at 1 s” is another figure: a low-pass lowers it"),
+    ("density / N", "two-sided density of the spectrum's floor over N from the Allan curve: two ways to one figure"),
     ("RRW, K", "K [deg/h/√h] = 60·K [deg/h/√s]"),
     ("bias instability, B", "flicker coefficient, min σ/0.664 where the curve has a flat floor"),
     ("bias drift", "the papers' name for the minimum of the Allan curve, min σ, given with its τ"),
+    ("Q, R", "part of the model only where the curve gives evidence of them; else an upper limit, “< x”"),
     ("improvement factor", "mean over the single gyros / figure of the virtual gyro (Liu et al. 2015, eq. 18)"),
-    ("intervals", "95 %: chi² with equivalent degrees of freedom for Allan deviations, moving-block bootstrap else"),
-    ("gaps", "estimates are made over gap-free stretches; none bridges a gap"),
     ("bandwidth", "−3 dB and noise-equivalent, one-sided, of the method alone; DC gain 1: a constant rate passes"),
 )  # fmt: skip
+BLOCK_WORDS = (
+    "length by the rule for an AR(1) series with the correlation length of the data (Carlstein 1986; Politis and White "
+    "2004), at most an eighth of the recording"
+)
+CALIBRATION_WORDS = (
+    "one least-squares line through all points, both directions; noise of the points taken off each size; a size below "
+    "the floor, which a perfect gyro would show by its noise, is given as an upper limit"
+)
 
 
-def conventions_part(figures: dict[str, Figure]) -> Markup:
+def conventions_part(dataset: DatasetPart) -> Markup:
     """The conventions, and the meaning of each figure."""
+    pairs = [*CONVENTIONS, *_chosen(dataset.options), ("calibration", CALIBRATION_WORDS)]
+    return join(
+        definitions(pairs),
+        _meanings("Meaning of every figure", dataset.figures),
+        _meanings("Meaning of every figure of a calibration", dataset.calibration_figures),
+    )
+
+
+def _chosen(options: Record) -> list[tuple[str, str]]:
+    """Conventions that depend on the options of the analysis."""
+    metrics = options.get("metrics") or {}
+    confidence = percent(float(metrics.get("confidence", 0.95)))
+    threshold = metrics.get("outlier_threshold")
+    outliers = (
+        "none is left out"
+        if threshold is None
+        else f"single samples more than {plain(float(threshold))} standard deviations off are counted and left out of "
+        "Allan deviation and spectrum"
+    )
+    bandwidth = metrics.get("equal_bandwidth_hz")
+    to = "the narrowest of the methods" if bandwidth is None else f"{plain(float(bandwidth))} Hz"
+    lost = plain(float(metrics.get("most_lost_s", 0.0)))
+    return [
+        ("equal bandwidth", f"every series low-passed to one bandwidth, {to}, with DC gain 1, before its 1σ is taken"),
+        (
+            "intervals",
+            f"{confidence}: chi² with equivalent degrees of freedom (Greenhall and Riley) for Allan deviations, "
+            "parametric bootstrap for the coefficients, moving-block bootstrap else",
+        ),
+        (
+            "paired",
+            "all series of an improvement factor are resampled in the same blocks; “not significant”: it may be 1",
+        ),
+        ("blocks", BLOCK_WORDS),
+        (
+            "gaps",
+            f"nothing is put in place of a lost sample; an average goes over losses of up to {lost} s, at the true "
+            "times, where at least 90 % of each half is there; a longer loss is never bridged",
+        ),
+        ("outliers", outliers),
+    ]
+
+
+def _meanings(title: str, figures: Mapping[str, Figure]) -> Markup:
     rows = [[Cell(figure.title), Cell(figure.unit), Cell(figure.meaning)] for figure in figures.values()]
     columns = [Column("figure", numeric=False), Column("unit", numeric=False), Column("meaning", numeric=False)]
-    meanings = details("Meaning of every figure", render_table(columns, rows)) if rows else Markup("")
-    return join(definitions(CONVENTIONS), meanings)
+    return details(title, render_table(columns, rows)) if rows else Markup("")
 
 
 def provenance_part(dataset: DatasetPart) -> Markup:

@@ -6,31 +6,22 @@ from typing import Any
 
 from markupsafe import Markup
 
-from vgyro.report.conclusions import (
-    ARCH_RULE,
-    BAD_RULE,
-    BEST_RULE,
-    Best,
-    Conclusion,
-    bad_gyros,
-    best_method,
-    conclude,
-    main_arrays,
-)
+from vgyro.report.arch import ARCH_RULE
+from vgyro.report.best import BEST_RULES, Best, best_of_all
+from vgyro.report.conclusions import BAD_RULE, bad_gyros, conclude, main_arrays
 from vgyro.report.conventions import conventions_part, provenance_part
 from vgyro.report.crosscheck import crosscheck_part
-from vgyro.report.html import heading, join, macro, paragraph
-from vgyro.report.methods import dynamic_table, rest_table
+from vgyro.report.html import bullets, details, heading, join, macro, paragraph
+from vgyro.report.methods import dynamic_table, response_table, rest_tables
 from vgyro.report.model import ArrayPart, DatasetPart
-from vgyro.report.noise import allan_plot, spectrum_plot
+from vgyro.report.moved import MOVED_RULE, moved_table
+from vgyro.report.noise import allan_plot, cross_allan_plot, spectrum_plot, tones_table
 from vgyro.report.page import Section, render_page
 from vgyro.report.recordings import recordings_part
 from vgyro.report.scale import calibration_part, nominal
+from vgyro.report.sentences import Conclusion
 from vgyro.report.series import correlation_table, rates_plots, temperature_plot
 from vgyro.report.volatility import volatility_part
-
-# Of the methods that do not narrow the bandwidth: what a low-pass gains at rest it loses in motion.
-HEADLINE_FACTOR = "if_sigma"
 
 
 def render_dataset(dataset: DatasetPart) -> str:
@@ -40,7 +31,7 @@ def render_dataset(dataset: DatasetPart) -> str:
         Section("recordings", "What was measured, and how complete it is", recordings_part(dataset)),
         Section("calibration", "Calibration", calibration_part(dataset)),
         *_array_sections(dataset),
-        Section("conventions", "Conventions", conventions_part(dict(dataset.figures))),
+        Section("conventions", "Conventions", conventions_part(dataset)),
         Section("provenance", "Provenance", provenance_part(dataset)),
     ]
     manifest = dataset.manifest
@@ -56,7 +47,8 @@ def render_dataset(dataset: DatasetPart) -> str:
 def _conclusions(found: list[Conclusion]) -> Markup:
     if not found:
         return paragraph("Nothing can be concluded: no recording could be analysed.", "bad")
-    return join(macro("conclusions", found=tuple(found)), paragraph(f"{BAD_RULE} {BEST_RULE} {ARCH_RULE}", "note"))
+    rules = details("Rules behind these sentences", bullets([BAD_RULE, *BEST_RULES, MOVED_RULE, ARCH_RULE]))
+    return join(macro("conclusions", found=tuple(found)), rules)
 
 
 def _array_sections(dataset: DatasetPart) -> list[Section]:
@@ -79,13 +71,17 @@ def _child(dataset: DatasetPart, array: ArrayPart, opened: bool) -> Section:
         temperature_plot(recording) if first else "",
         heading("Correlation", 4),
         correlation_table(recording, array),
+        cross_allan_plot(array),
         volatility_part(array),
         heading("Noise", 4),
         allan_plot(array),
         spectrum_plot(array),
+        tones_table(array),
         heading("Methods", 4),
-        rest_table(dataset, array),
+        rest_tables(dataset, array),
+        moved_table(dataset, array),
         dynamic_table(dataset, array),
+        response_table(dataset, array),
         crosscheck_part(array),
     )
     return Section(array.anchor, recording.name, html, aside=recording.kind, opened=opened)
@@ -126,17 +122,13 @@ def _scale(dataset: DatasetPart) -> str:
 
 
 def _best_of_all(dataset: DatasetPart) -> Best | None:
-    found = [
-        best
-        for array in main_arrays(dataset)
-        if (best := best_method(array, HEADLINE_FACTOR, full_bandwidth=True)) is not None
-    ]
+    found = [best for array in main_arrays(dataset) if (best := best_of_all(array)) is not None]
     return max(found, key=lambda best: best.factor.value, default=None)
 
 
 def _record(best: Best) -> dict[str, Any]:
     limits = {name: _finite(getattr(best.factor, name)) for name in ("value", "low", "high")}
-    return {"label": best.label, "axis": best.axis, "recording": best.recording, "figure": HEADLINE_FACTOR, **limits}
+    return {"label": best.label, "axis": best.axis, "recording": best.recording, "figure": best.figure, **limits}
 
 
 def _finite(value: float) -> float | None:

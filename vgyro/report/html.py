@@ -68,6 +68,11 @@ def link(text: str, target: str) -> Markup:
     return macro("link", text=text, target=target)
 
 
+def print_button(text: str, target: str) -> Markup:
+    """A button that prints one part of the page alone. target : identifier of the part"""
+    return macro("print_button", text=text, target=target)
+
+
 def join(*parts: Markup | str) -> Markup:
     """Pieces one after the other; plain strings are escaped."""
     return Markup("\n").join(part for part in parts if part)

@@ -18,7 +18,7 @@ COLUMNS = (
     Column("recordings"),
     Column("length"),
     Column("bad gyros", numeric=False, hint="more than twice the median of their array"),
-    Column("best method by 1σ, full bandwidth", numeric=False),
+    Column("best method by 1σ, at equal bandwidth", numeric=False),
     Column("improvement factor"),
     Column("scale", numeric=False),
     Column("status", numeric=False),

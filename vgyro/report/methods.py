@@ -1,144 +1,240 @@
-"""Table of methods: what each gyro and each virtual gyro reaches, by how much it improves, and what the method is."""
+"""Tables of methods: what each gyro and each virtual gyro reaches, by how much it improves, and what the method is."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from markupsafe import Markup
 
+from vgyro.report.figure_cells import BAND_LIMITED, figure_cell, figure_column
 from vgyro.report.html import join, paragraph
-from vgyro.report.model import ArrayPart, DatasetPart, Figure, Value
-from vgyro.report.numbers import MISSING, significant
-from vgyro.report.tables import Cell, Column, Notes, Row, number_cell, render_table
+from vgyro.report.model import ArrayPart, DatasetPart, Figure, Value, Values
+from vgyro.report.numbers import MISSING, count, significant
+from vgyro.report.tables import Cell, Column, Notes, Row, render_table
 
-REST = (
-    ("if_sigma", "improvement factor"),
-    ("if_arw_1s", "improvement factor"),
-    ("if_bias_drift", "improvement factor"),
-    ("sigma", "samples at rest"),
-    ("noise_density", "white noise"),
-    ("arw_1s", "white noise"),
-    ("arw", "white noise"),
-    ("bias_drift", "drift"),
-    ("bias_drift_tau", "drift"),
-    ("bias_instability", "drift"),
-    ("rrw_read", "drift"),
-    ("rrw", "drift"),
-    ("mean", "samples at rest"),
-    ("if_mean", "samples at rest"),
+FAIR, RAW = "fair: free of the bandwidth", "raw, as the papers"
+SAMPLES, READ, WHITE, SLOW, ANGLE = (
+    "samples",
+    "read off the Allan curve, as the papers",
+    "white noise",
+    "slow noise",
+    "angle",
 )
-DYNAMIC = ("error_mean", "error_sigma", "error_sigma_aligned", "error_sigma_scaled", "amplitude", "delay")
-HIGHER_IS_BETTER = ("if_sigma", "if_arw_1s", "if_bias_drift")
-LOWER_IS_BETTER = ("sigma", "bias_drift", "error_sigma", "error_sigma_aligned", "error_sigma_scaled")
-# Said of nearly every cell: a tooltip will do.
-ROUTINE = (
-    "bootstrap of blocks",
-    "each pose's own mean",
-    "two-sided,",
-    "line through",
-    "fitted from",
-    "limits from the chi²",
-    "one-sided ",
-    "of the error",
+IMPROVEMENT = (
+    ("if_sigma_equal", FAIR),
+    ("if_arw", FAIR),
+    ("if_bias_drift", FAIR),
+    ("if_sigma", RAW),
+    ("if_arw_1s", RAW),
+    ("if_mean", RAW),
 )
-NOT_SIGNIFICANT = "not significant"
-NOT_SHOWN = "not shown to exist"
+ACCURACY = (
+    ("sigma_equal", SAMPLES),
+    ("sigma", SAMPLES),
+    ("mean", SAMPLES),
+    ("arw_1s", READ),
+    ("bias_drift", READ),
+    ("bias_drift_tau", READ),
+    ("rrw_read", READ),
+)
+COEFFICIENTS = (
+    ("noise_density", WHITE),
+    ("arw", WHITE),
+    ("density_ratio", WHITE),
+    ("quantisation", WHITE),
+    ("bias_instability", SLOW),
+    ("rrw", SLOW),
+    ("rate_ramp", SLOW),
+    ("angle_drift_60s", ANGLE),
+    ("angle_bound_60s", ANGLE),
+)
+COUNTS = ("missing", "outliers", "clipped")
+DYNAMIC = (
+    "error_mean",
+    "error_sigma",
+    "error_sigma_aligned",
+    "error_sigma_scaled",
+    "amplitude",
+    "phase",
+    "delay",
+    "angle_drift_60s",
+    "angle_bound_60s",
+)
+HIGHER_IS_BETTER = ("if_sigma_equal", "if_sigma", "if_arw", "if_arw_1s", "if_bias_drift")
+LOWER_IS_BETTER = (
+    "sigma_equal",
+    "sigma",
+    "arw",
+    "bias_drift",
+    "error_sigma",
+    "error_sigma_aligned",
+    "error_sigma_scaled",
+    "angle_drift_60s",
+)
 PROPERTIES = (
-    ("dc_gain", Column("DC gain", "1", group="the method itself")),
-    ("bandwidth_hz", Column("−3 dB bandwidth", "Hz", group="the method itself")),
-    ("noise_bandwidth_hz", Column("noise bandwidth", "Hz", group="the method itself")),
-    ("delay_s", Column("delay", "s", group="the method itself")),
+    Column("causal", numeric=False, hint="sample t uses nothing later than t", group="response of the method"),
+    Column("DC gain", "1", hint="gain for a constant rate", group="response of the method"),
+    Column("−3 dB bandwidth", "Hz", group="response of the method"),
+    Column("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group="response of the method"),
+    Column("delay", "s", hint="at low frequency", group="response of the method"),
+    Column("known", numeric=False, hint="how the four are known", group="response of the method"),
 )
-LIMITS = "Below each figure: 95 % limits."
-GENERAL = (
+MOST_WIDE = 7
+LIMITS = "Below each figure: its limits."
+FACTOR_WORDS = (
     "Improvement factor: mean of the figure over the single gyros / figure of the method (Liu et al. 2015, eq. 18). "
-    "Grey: its 95 % interval holds 1, so no improvement is shown. Bold on green: the best of the methods. A filter "
-    "that narrows the bandwidth lowers 1σ and the ARW read at 1 s by itself: compare methods of equal bandwidth. "
-    f"{LIMITS}"
+    "Grey: its interval holds 1, so no improvement is shown. Bold on green: the best of the methods. A filter that "
+    "narrows the bandwidth lowers 1σ and the ARW read at 1 s by itself; the fair factors compare 1σ with every series "
+    f"low-passed to one bandwidth, the fitted N, and the floor of the Allan curve. {LIMITS}"
+)
+BAND_WORDS = (
+    f"Marked “{BAND_LIMITED}”: the method's low-pass lowers this reading by itself, it is no measure of its noise. N "
+    "is fitted with the filter's shape and may be compared."
+)
+RESPONSE_WORDS = (
+    "Bandwidth and delay are the method's own, without the gyro's; “not limited”: it passes what the gyro passes."
 )
 
+MakeCells = Callable[[Mapping[str, Any]], list[Cell]]
 
-def rest_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
-    """Every figure of a recording at rest, gyros first, then methods; empty if only errors in motion are known."""
-    groups = [(name, group) for name, group in REST if _has(array, name)] if _has(array, "sigma") else []
-    order = list(dict.fromkeys(group for _, group in groups))
-    groups.sort(key=lambda pair: order.index(pair[1]))
-    if not groups and _has(array, "error_sigma"):
-        return Markup("")
-    if not groups:
+
+def rest_tables(dataset: DatasetPart, array: ArrayPart) -> Markup:
+    """Figures of a recording at rest, gyros first, then methods; empty if only errors in motion are known."""
+    values = array.values()
+    if not _known(values, "sigma"):
+        if _known(values, "error_sigma"):
+            return Markup("")
         return paragraph("No figures at rest: the recording holds too little data at rest.", "note")
-    caption = f"Gyros and methods at rest, axis {array.axis}, recording {array.recording}"
+    where = f"at rest, axis {array.axis}, recording {array.recording}"
+    parts: list[Markup] = []
+    if array.methods() and any(_known(values, name) for name, _ in IMPROVEMENT):
+        factors = _figures(dataset, array, values, IMPROVEMENT, f"Improvement {where}", gyros=False)
+        parts = [factors, paragraph(FACTOR_WORDS, "note")]
+    marked = any(value.note.startswith(BAND_LIMITED) for known in values.values() for value in known.values())
     return join(
-        _table(dataset.figures, array, groups, caption), paragraph(GENERAL if array.methods() else LIMITS, "note")
+        *parts,
+        _figures(dataset, array, values, ACCURACY, f"Accuracy {where}"),
+        paragraph(BAND_WORDS if marked else LIMITS, "note"),
+        _figures(dataset, array, values, COEFFICIENTS, f"Noise coefficients {where}"),
     )
 
 
 def dynamic_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
     """Errors against the reference; empty where there is none."""
-    present = [(name, "error against the reference") for name in DYNAMIC if _has(array, name)]
-    if not present:
+    values = array.values()
+    present = [(name, "error against the reference") for name in DYNAMIC if _known(values, name)]
+    if not _known(values, "error_sigma"):
         return Markup("")
-    if not _has(array, "sigma"):
+    if not _known(values, "sigma"):
         # Without rest these two are the factors of the errors.
-        factors = [(name, "improvement factor of the error") for name in ("if_sigma", "if_mean") if _has(array, name)]
-        present = [*factors, *present]
+        present = [*((name, "improvement factor of the error") for name in ("if_sigma", "if_mean")), *present]
+    else:
+        present = [(name, group) for name, group in present if not name.startswith("angle_")]
     caption = f"Errors against the reference rate, axis {array.axis}, recording {array.recording}"
+    table = _figures(dataset, array, values, present, caption)
     return join(
-        _table(dataset.figures, array, present, caption), paragraph(GENERAL if array.methods() else LIMITS, "note")
+        table, "" if _known(values, "sigma") else paragraph(FACTOR_WORDS if array.methods() else LIMITS, "note")
     )
 
 
-def _has(array: ArrayPart, metric: str) -> bool:
-    return any(value.known for values in array.values().values() for name, value in values.items() if name == metric)
+def _known(values: Values, metric: str) -> bool:
+    return any(known[metric].known for known in values.values() if metric in known)
 
 
-def _table(figures: Mapping[str, Figure], array: ArrayPart, groups: Sequence[tuple[str, str]], caption: str) -> Markup:
-    values, notes = array.values(), Notes()
-    metrics = [name for name, _ in groups]
-    best = {name: _best(array, values, name) for name in metrics}
-    methods = array.methods()
+def _figures(
+    dataset: DatasetPart,
+    array: ArrayPart,
+    values: Values,
+    groups: Sequence[tuple[str, str]],
+    caption: str,
+    gyros: bool = True,
+) -> Markup:
+    """One table: gyros, unless they are left out, then methods; columns the figures of `groups` that are known."""
+    notes = Notes()
+    metrics = [(name, group) for name, group in groups if _known(values, name)]
+    best = {name: _best(array, values, name) for name, _ in metrics}
     columns = [Column("", numeric=False)]
-    for name, group in groups:
-        figure = figures.get(name) or Figure(name, _unit(values, name), "")
-        columns.append(
-            Column(figure.title, "" if figure.unit == "1" else figure.unit, hint=figure.meaning, group=group)
-        )
-    if methods:
-        columns.append(Column("causal", numeric=False, group="the method itself"))
-        columns += [column for _, column in PROPERTIES]
-    rows: list[Row] = [Row(heading="Single gyros")]
-    for gyro in array.gyros:
+    columns += [figure_column(dataset.figures.get(name) or _unnamed(values, name), group) for name, group in metrics]
+
+    def of_gyro(gyro: str) -> list[Cell]:
         known = values.get((gyro, ""), {})
-        cells = [Cell(gyro), *(_cell(known.get(name), name, notes, gyro=True) for name in metrics)]
-        rows.append(Row((*cells, *[Cell("")] * (len(columns) - len(cells)))))
-    if methods:
-        rows.append(Row(heading="Methods"))
+        return [figure_cell(known.get(name), name, notes, gyro=True) for name, _ in metrics]
+
+    def of_method(method: Mapping[str, Any]) -> list[Cell]:
+        name = (method["method"], method["definition"])
+        known = values.get(name, {})
+        return [figure_cell(known.get(metric), metric, notes, best=best[metric] == name) for metric, _ in metrics]
+
+    rows = _rows(array, of_gyro if gyros else None, of_method, len(metrics), notes)
+    return render_table(columns, rows, caption, notes.texts, compact=len(metrics) > MOST_WIDE)
+
+
+def _rows(
+    array: ArrayPart, of_gyro: Callable[[str], list[Cell]] | None, of_method: MakeCells, width: int, notes: Notes
+) -> list[Row]:
+    """Gyros and methods under their headings; a method that did not run has one cell that says why."""
+    methods = array.methods()
+    rows: list[Row] = []
+    if of_gyro is not None:
+        rows += [Row(heading="Single gyros"), *(Row((Cell(gyro), *of_gyro(gyro))) for gyro in array.gyros)]
+        rows += [Row(heading="Methods")] if methods else []
     for method in methods:
-        known = values.get((method["method"], method["definition"]), {})
-        rows.append(_method_row(method, known, metrics, best, notes))
-    return render_table(columns, rows, caption, notes.texts)
+        if method["column"]:
+            first = Cell(
+                method["title"], method["definition"], notes=notes.number(method["note"]), hint=method["source"]
+            )
+            rows.append(Row((first, *of_method(method))))
+        else:
+            first = Cell(method["title"], method["definition"], hint=method["source"])
+            rows.append(Row((first, Cell(f"not run: {method['note']}", tone="muted", span=width))))
+    return rows
 
 
-def _method_row(
-    method: Mapping[str, Any],
-    known: Mapping[str, Value],
-    metrics: Sequence[str],
-    best: Mapping[str, tuple[str, str] | None],
-    notes: Notes,
-) -> Row:
-    name = (method["method"], method["definition"])
-    first = Cell(method["title"], method["definition"], notes=notes.number(method["note"]), hint=method["source"])
-    if not method["column"]:
-        width = len(metrics) + 1 + len(PROPERTIES)
-        return Row((first, *[Cell(MISSING, tone="muted", hint=f"not run: {method['note']}")] * width))
-    cells = [first]
-    for metric in metrics:
-        cells.append(_cell(known.get(metric), metric, notes, best=best[metric] == name))
-    cells.append(Cell("yes" if method["causal"] else "no, offline"))
-    cells += [_property(float(method[name])) for name, _ in PROPERTIES]
-    return Row(tuple(cells))
+def response_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
+    """What was left out of each series, and how each method answers to a motion."""
+    notes, values, methods = Notes(), array.values(), array.methods()
+    counted = [name for name in COUNTS if _known(values, name)]
+    if not counted and not methods:
+        return Markup("")
+    properties = PROPERTIES if methods else ()
+    columns = [Column("", numeric=False)]
+    for name in counted:
+        figure = dataset.figures.get(name) or _unnamed(values, name)
+        columns.append(Column(figure.title, "samples", hint=figure.meaning, group="data of the series"))
+    columns += properties
+
+    def counts(series: tuple[str, str]) -> list[Cell]:
+        known = values.get(series, {})
+        return [_count(known.get(name)) for name in counted]
+
+    def of_method(method: Mapping[str, Any]) -> list[Cell]:
+        return [*counts((method["method"], method["definition"])), *_answers(method)]
+
+    def of_gyro(gyro: str) -> list[Cell]:
+        return [*counts((gyro, "")), *([Cell("", span=len(properties))] if properties else [])]
+
+    caption = f"Data and response, axis {array.axis}, recording {array.recording}"
+    rows = _rows(array, of_gyro, of_method, len(columns) - 1, notes)
+    return join(render_table(columns, rows, caption, notes.texts), paragraph(RESPONSE_WORDS, "note") if methods else "")
+
+
+def _count(value: Value | None) -> Cell:
+    if value is None or not value.known:
+        return Cell(MISSING, tone="muted", hint=value.note if value else "not counted")
+    return Cell(count(value.value), tone="warn" if value.value else "", hint=value.note)
+
+
+def _answers(method: Mapping[str, Any]) -> list[Cell]:
+    limited = [_property(float(method[name])) for name in ("bandwidth_hz", "noise_bandwidth_hz")]
+    return [
+        Cell("yes" if method["causal"] else "no, offline"),
+        Cell(significant(float(method["dc_gain"]))),
+        *limited,
+        Cell(significant(float(method["delay_s"]))),
+        Cell(str(method.get("response") or MISSING)),
+    ]
 
 
 def _property(value: float) -> Cell:
@@ -147,29 +243,7 @@ def _property(value: float) -> Cell:
     return Cell(significant(value))
 
 
-def _cell(value: Value | None, metric: str, notes: Notes, *, gyro: bool = False, best: bool = False) -> Cell:
-    if value is None:
-        hint = "compares a method with the single gyros" if gyro and metric.startswith("if_") else "not computed"
-        return Cell("" if gyro and metric.startswith("if_") else MISSING, tone="muted", hint=hint)
-    if not value.known:
-        return Cell(MISSING, tone="muted", hint=value.note, notes=notes.number(value.note))
-    if value.note.startswith(NOT_SHOWN):
-        return Cell(f"< {significant(value.high, 2)}", tone="muted", hint=value.note)
-    insignificant = value.note.startswith(NOT_SIGNIFICANT)
-    routine = insignificant or all(clause.startswith(ROUTINE) for clause in value.note.split("; "))
-    return number_cell(
-        value.value,
-        value.low,
-        value.high,
-        tone="muted" if insignificant else "best" if best else "",
-        notes=() if routine else notes.number(value.note),
-        hint=value.note,
-    )
-
-
-def _best(
-    array: ArrayPart, values: Mapping[tuple[str, str], Mapping[str, Value]], metric: str
-) -> tuple[str, str] | None:
+def _best(array: ArrayPart, values: Values, metric: str) -> tuple[str, str] | None:
     """Method with the best value of a figure that has a better side."""
     sign = 1 if metric in HIGHER_IS_BETTER else -1 if metric in LOWER_IS_BETTER else 0
     found = {
@@ -180,5 +254,5 @@ def _best(
     return max(found, key=found.__getitem__) if found else None
 
 
-def _unit(values: Mapping[tuple[str, str], Mapping[str, Value]], metric: str) -> str:
-    return next(known[metric].unit for known in values.values() if metric in known)
+def _unnamed(values: Values, metric: str) -> Figure:
+    return Figure(metric, next(known[metric].unit for known in values.values() if metric in known), "")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from vgyro.dataset import Manifest
 
 Table = Mapping[str, np.ndarray]
 Record = Mapping[str, Any]
+# Recordings to which a rate is added for a second table (metrics.injected_rate).
+MOVED_KINDS = ("static", "thermal")
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ class Value:
     @property
     def known(self) -> bool:
         return math.isfinite(self.value)
+
+
+# (method or gyro, definition) → metric → figure, in the order of the table.
+Values = dict[tuple[str, str], dict[str, Value]]
 
 
 @dataclass(frozen=True)
@@ -122,8 +129,10 @@ class ArrayPart:
     """One array in one recording.
 
     gyros      : names, in the board's order
-    tables     : correlation, allan, spectrum, metrics, methods, crosscheck: columns as arrays; absent ones are missing
+    tables     : correlation, allan, cross_allan, spectrum, tones, metrics, methods, effects, crosscheck: columns as
+                 arrays; absent ones are missing
     volatility : definition → its part
+    kind       : kind of the recording
     """
 
     recording: str
@@ -131,21 +140,38 @@ class ArrayPart:
     gyros: tuple[str, ...]
     tables: Mapping[str, Table]
     volatility: Mapping[str, VolatilityPart]
+    kind: str = "static"
 
     @property
     def anchor(self) -> str:
         return f"{self.recording}-{self.axis}"
 
-    def values(self) -> dict[tuple[str, str], dict[str, Value]]:
-        """(method or gyro, definition) → metric → figure, in the order of the table."""
-        table = self.tables.get("metrics", {})
-        found: dict[tuple[str, str], dict[str, Value]] = {}
-        for row in rows_of(table):
+    def values(self) -> Values:
+        """Figures of the recording as it is; of one at rest, the rows with an added rate are left out."""
+        return self._values[0]
+
+    def moved_values(self) -> Values:
+        """Figures of a recording at rest to which a constant rate was added; empty where none was."""
+        return self._values[1]
+
+    @property
+    def added_rate(self) -> float:
+        """The rate of moved_values, deg/s; 0 where there are none."""
+        rates = self.tables.get("metrics", {}).get("true_rate", np.empty(0))
+        added = rates[rates != 0] if self.kind in MOVED_KINDS else rates[:0]
+        return float(added[0]) if len(added) else 0.0
+
+    @cached_property
+    def _values(self) -> tuple[Values, Values]:
+        still: Values = {}
+        moved: Values = {}
+        for row in rows_of(self.tables.get("metrics", {})):
             value = Value(
                 float(row["value"]), float(row["low"]), float(row["high"]), str(row["unit"]), str(row["note"])
             )
+            found = moved if row["true_rate"] != 0 and self.kind in MOVED_KINDS else still
             found.setdefault((str(row["method"]), str(row["definition"])), {})[str(row["metric"])] = value
-        return found
+        return still, moved
 
     def methods(self) -> list[dict[str, Any]]:
         """Rows of methods.parquet."""
@@ -169,7 +195,10 @@ class RecordingPart:
 
 @dataclass(frozen=True)
 class DatasetPart:
-    """Everything that the page of a data set shows. noise : axis → noise/<axis>.json;  sources : path → metadata"""
+    """Everything that the page of a data set shows.
+
+    noise : axis → noise/<axis>.json;  figures, calibration_figures : name → its meaning;  sources : path → metadata
+    """
 
     name: str
     manifest: Manifest
@@ -178,6 +207,7 @@ class DatasetPart:
     calibration: Record
     noise: Mapping[str, Record] = field(default_factory=dict)
     figures: Mapping[str, Figure] = field(default_factory=dict)
+    calibration_figures: Mapping[str, Figure] = field(default_factory=dict)
     options: Record = field(default_factory=dict)
     sources: Mapping[str, Record] = field(default_factory=dict)
 

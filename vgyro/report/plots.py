@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from bokeh.plotting import figure
 
 Scale = Literal["linear", "log"]
+Marker = Literal["circle", "triangle", "inverted_triangle"]
 SVG_DASHES = {"solid": "", "dashed": "6 3", "dotted": "2 3", "dotdash": "2 3 6 3"}
 
 
@@ -30,7 +31,8 @@ class Curve:
 
     name  : unique in the plot;  label : what the legend says;  x, y : arrays [T]; NaN breaks the line
     low, high : interval at each point, drawn as a thin bar;  colour : number in the palette, dashes follow from it
-    width : px;  line, points : whether the points are joined, whether each is marked;  visible : shown from the start
+    width : px;  line, points : whether the points are joined, whether each is marked, and how
+    visible : shown from the start
     group : heading in the legend;  ink : the colour of text, for the curve that the others are held against
     behind : a curve with more of it is drawn first, so that a wide one does not hide the others
     """
@@ -49,6 +51,7 @@ class Curve:
     visible: bool = True
     group: str = ""
     behind: float = 0.0
+    marker: Marker = "circle"
 
 
 @dataclass(frozen=True)
@@ -85,20 +88,22 @@ def curve_plot(
     summary: str = "",
     spans: Sequence[tuple[float, float]] = (),
     levels: Sequence[float] = (),
+    lines: Sequence[float] = (),
     height: int = 300,
 ) -> Markup:
     """A plot of curves, with a legend whose entries show and hide them.
 
     identifier : anchor, unique in the page;  spans : stretches [start, stop] of x with a tinted ground
-    levels     : horizontal lines;  height : px;  the width is that of the page
+    levels, lines : horizontal and vertical lines;  height : px;  the width is that of the page
     """
     plot = _empty(x, y, height)
     _mark_spans(plot, spans)
-    _mark_levels(plot, levels)
+    _mark_lines(plot, levels, "width")
+    _mark_lines(plot, lines, "height")
     sources = _sources(curves)
     order = sorted(range(len(curves)), key=lambda index: -curves[index].behind)
-    lines = [_draw(plot, curves[index], sources[index]) for index in order]
-    _add_hover(plot, [line for line in lines if line is not None], x, y)
+    drawn = [_draw(plot, curves[index], sources[index]) for index in order]
+    _add_hover(plot, [one for one in drawn if one is not None], x, y)
     item = {"json": _escaped(_as_json(plot, identifier)), "height": height}
     legend = _legend(curves) if len(curves) > 1 else ()
     return macro("plot", identifier=identifier, title=title, summary=summary, item=item, legend=legend)
@@ -201,11 +206,13 @@ def _mark_spans(plot: figure, spans: Sequence[tuple[float, float]]) -> None:
         )
 
 
-def _mark_levels(plot: figure, levels: Sequence[float]) -> None:
+def _mark_lines(plot: figure, places: Sequence[float], dimension: Literal["width", "height"]) -> None:
     from bokeh.models import Span
 
-    for level in levels:
-        plot.add_layout(Span(location=level, dimension="width", line_color=MUTED, line_dash="dashed"))
+    for place in places:
+        plot.add_layout(
+            Span(location=place, dimension=dimension, line_color=MUTED, line_dash="dashed", level="underlay")
+        )
 
 
 def _sources(curves: Sequence[Curve]) -> list[Any]:
@@ -245,7 +252,8 @@ def _draw(plot: figure, curve: Curve, source: Any) -> Any:
         line = Line(x="x", y=curve.name, line_color=colour, line_width=curve.width, line_dash=dash)
         drawn.append(plot.add_glyph(source, line, **common))
     if curve.points:
-        mark = Scatter(x="x", y=curve.name, size=4, line_color=colour, fill_color=PAPER)
+        size = 4 if curve.marker == "circle" else 7
+        mark = Scatter(x="x", y=curve.name, size=size, marker=curve.marker, line_color=colour, fill_color=PAPER)
         drawn.append(plot.add_glyph(source, mark, **common))
     return drawn[0] if drawn else None
 

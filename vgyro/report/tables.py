@@ -30,7 +30,7 @@ class Cell:
     """One cell. text : a plain string, escaped, or Markup
 
     below : small second line (an interval);  tone : colour by meaning;  shade : -1..1, background of a coloured matrix
-    notes : numbers of footnotes;  hint : tooltip
+    notes : numbers of footnotes;  hint : tooltip;  mark : a short word in a box;  span : columns that it fills
     """
 
     text: str
@@ -39,6 +39,8 @@ class Cell:
     shade: float | None = None
     notes: tuple[int, ...] = ()
     hint: str = ""
+    mark: str = ""
+    span: int = 1
 
 
 @dataclass(frozen=True)
@@ -67,11 +69,11 @@ class Notes:
 
 def number_cell(
     value: float, low: float = float("nan"), high: float = float("nan"), *, tone: Tone = "",
-    notes: tuple[int, ...] = (), hint: str = "",
+    notes: tuple[int, ...] = (), hint: str = "", mark: str = "",
 ) -> Cell:  # fmt: skip
     """A figure with its interval below it; a dash where it is missing (say why in `notes` or `hint`)."""
     text, interval = with_interval(value, low, high)
-    return Cell(text, interval, "muted" if text == MISSING else tone, None, notes, hint)
+    return Cell(text, interval, "muted" if text == MISSING else tone, None, notes, hint, mark)
 
 
 def render_table(
@@ -97,8 +99,9 @@ def render_table(
 def _row(row: Row | Sequence[Cell | str], width: int) -> Row:
     if not isinstance(row, Row):
         row = Row(tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row))
-    if not row.heading and len(row.cells) != width:
-        raise ValueError(f"a row has {len(row.cells)} cells, the table has {width} columns: {row.cells[:1]}")
+    filled = sum(cell.span for cell in row.cells)
+    if not row.heading and filled != width:
+        raise ValueError(f"a row has {filled} cells, the table has {width} columns: {row.cells[:1]}")
     return row
 
 

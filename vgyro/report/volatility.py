@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
+from vgyro.report.arch import effects_table
 from vgyro.report.fits import fits_map, shares
 from vgyro.report.html import details, heading, join, paragraph
 from vgyro.report.model import ArrayPart, DccSummary, GarchSummary, Record, Table, VolatilityPart, WeightCurves, rows_of
@@ -16,7 +17,7 @@ from vgyro.report.tables import Cell, Column, Row, render_table
 
 LEVEL_OF_TEST = 0.05
 TIME = Axis("time, s")
-SERIES = ("level", "detrended", "standardised")
+SERIES = ("level", "detrended", "whitened", "standardised")
 MEANING = {
     "level": "level: r is the output itself, its second moment about zero",
     "demeaned": "demeaned: the mean of each window is removed",
@@ -24,9 +25,10 @@ MEANING = {
     "residual": "residual: the array's own first-pass estimate of the rate is removed",
 }
 ARCH_WORDS = (
-    "A slow drift of the level rejects this test by itself, without any change of variance: a rejection counts as ARCH "
-    "only where the detrended series rejects too. Where the standardised residuals still reject, GARCH(1,1) has not "
-    "explained it. Kurtosis is 3 for a Gaussian."
+    "Whitened: tones taken out, then the residuals of an autoregression. A drift of the level, memory of the noise or "
+    "a tone rejects this test by itself, without any change of variance: only a rejection of the whitened series "
+    "counts as ARCH. Where the standardised residuals still reject, GARCH(1,1) has not explained it. Kurtosis is 3 "
+    "for a Gaussian."
 )
 TEST_WORDS = (
     "Engle and Sheppard's test, with one lag. Whitening by the sample's own correlation makes chi²(s + 1) reject too "
@@ -36,11 +38,11 @@ TEST_WORDS = (
 
 
 def volatility_part(array: ArrayPart) -> Markup:
-    """ARCH-LM of all definitions, then one part that opens for each definition."""
+    """What the ARCH effects are, ARCH-LM of all definitions, then one part that opens for each definition."""
     if not array.volatility:
         return paragraph("The recording is too short at rest for a rolling window: no volatility analysis.", "note")
     parts = [_definition_part(array, name, part) for name, part in array.volatility.items()]
-    return join(heading("Volatility", 4), _arch_lm(array), *parts)
+    return join(heading("Volatility", 4), effects_table(array), _arch_lm(array), *parts)
 
 
 def _arch_lm(array: ArrayPart) -> Markup:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vgyro.board import Board
+from vgyro.calibration.figures import FIGURES as CALIBRATION_FIGURES
 from vgyro.config import DEFINITIONS
 from vgyro.dataset import Manifest
 from vgyro.metrics.figures import FIGURES
@@ -18,7 +19,7 @@ from vgyro.tasks.report_rates import read_rates
 from vgyro.tasks.report_volatility import read_volatility
 
 # Long, and drawn nowhere: what is told of them is in allan, spectrum, metrics and arch_lm.
-NOT_READ = ("fused", "series")
+NOT_READ = ("fused", "moved", "series")
 RESULTS = "results"
 
 
@@ -71,7 +72,7 @@ def read_dataset_part(task: Task) -> DatasetPart:
             recording.kind,
             read_json(path),
             rates_of(placed, recording.name, board),
-            read_arrays(placed, recording.name, board),
+            read_arrays(placed, recording.name, recording.kind, board),
         )
         for recording, path in zip(manifest.recordings, task.inputs["integrity"], strict=True)
     )
@@ -83,6 +84,7 @@ def read_dataset_part(task: Task) -> DatasetPart:
         read_json(task.input("calibration")),
         {path.stem: read_json(path) for path in task.inputs.get("noise", [])},
         {key: Figure(figure.title, figure.unit, figure.meaning) for key, figure in FIGURES.items()},
+        {key: Figure(figure.title, figure.unit, figure.meaning) for key, figure in CALIBRATION_FIGURES.items()},
         task.options.get("analysis", {}),
         read_sources(task, placed),
     )
@@ -94,7 +96,7 @@ def rates_of(placed: dict[Place, Path], recording: str, board: Board) -> RatesPa
     return None if path is None else read_rates(path, [gyro.name for gyro in board.gyros])
 
 
-def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tuple[ArrayPart, ...]:
+def read_arrays(placed: dict[Place, Path], recording: str, kind: str, board: Board) -> tuple[ArrayPart, ...]:
     """The arrays of a recording that have artefacts, in the board's order."""
     arrays = []
     for axis in board.axes:
@@ -110,7 +112,7 @@ def read_arrays(placed: dict[Place, Path], recording: str, board: Board) -> tupl
         if tables:
             gyros = tuple(gyro.name for gyro in board.array(axis))
             parts = {str(name): read_volatility(volatility[name], gyros) for name in DEFINITIONS if name in volatility}
-            arrays.append(ArrayPart(recording, axis, gyros, tables, parts))
+            arrays.append(ArrayPart(recording, axis, gyros, tables, parts, kind))
     return tuple(arrays)
 
 

@@ -22,6 +22,7 @@ rule report:
             "board",
             "integrity",
             "rest",
+            "calibration",
             "volatility",
             "fusion",
             "metrics",

@@ -76,6 +76,29 @@
   });
   label();
 
+  const frame = () => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)));
+
+  // One part alone on paper: its plots are drawn light, and as wide as a sheet.
+  async function printAlone(sheet) {
+    const theme = root.dataset.theme;
+    root.dataset.theme = "light";
+    sheet.classList.add("printed");
+    document.body.classList.add("alone");
+    const plots = [...sheet.querySelectorAll("figure.plot")].filter((figure) => figure.checkVisibility());
+    await Promise.all(plots.map(draw));
+    await frame();
+    window.print();
+    document.body.classList.remove("alone");
+    sheet.classList.remove("printed");
+    if (theme) root.dataset.theme = theme;
+    else delete root.dataset.theme;
+    plots.forEach(draw);
+  }
+  for (const printer of document.querySelectorAll("button.print")) {
+    printer.hidden = false;
+    printer.addEventListener("click", () => printAlone(document.getElementById(printer.dataset.print)));
+  }
+
   // A link into a closed part opens it.
   function openTarget() {
     const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));

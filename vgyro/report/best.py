@@ -1,0 +1,164 @@
+"""Which method is best at rest and in motion, by stated rules, and which one a constant rate spoils."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.report.model import ArrayPart, DatasetPart, Figure, Value
+from vgyro.report.moved import failing
+from vgyro.report.noise import method_labels
+from vgyro.report.numbers import plain, significant
+from vgyro.report.sentences import Conclusion, factor, interval
+
+SIMPLE = ("average", "median", "inverse_variance_arw")
+FAIR, RAW = "if_sigma_equal", "if_sigma"
+FACTORS = ((FAIR, "1σ at equal bandwidth"), ("if_arw", "N"), ("if_bias_drift", "bias drift"))
+RAW_FACTOR = (RAW, "1σ")
+IN_SAMPLE = "_in_sample"
+BEST_RULES = (
+    "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording at "
+    "rest, by 1σ at equal bandwidth (every series low-passed to one bandwidth), by the fitted N and by bias drift. "
+    "In-sample weights are left out, because they have seen what they weigh.",
+    "DCC beats the simple baselines (average, median, fixed inverse variance) where the lower limit of its factor is "
+    "above the best of theirs.",
+)
+Name = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Best:
+    """Best method of an array by one improvement factor. figure : its name in metrics.parquet"""
+
+    label: str
+    name: Name
+    figure: str
+    factor: Value
+    axis: str
+    recording: str
+
+    @property
+    def method(self) -> str:
+        return self.name[0]
+
+
+def best_method(array: ArrayPart, figure: str, allowed: Callable[[Name], bool] = lambda _: True) -> Best | None:
+    """The method, not in-sample, with the greatest improvement factor, of those that `allowed` lets pass."""
+    found = [
+        Best(label, name, figure, array.values()[name][figure], array.axis, array.recording)
+        for name, label in _labels(array).items()
+        if not name[0].endswith(IN_SAMPLE) and allowed(name) and figure in _known(array, name)
+    ]
+    return max(found, key=lambda best: best.factor.value, default=None)
+
+
+def best_of_all(array: ArrayPart) -> Best | None:
+    """By 1σ at equal bandwidth, of the methods that hold at the added rate.
+
+    Where bandwidths were not made equal: by 1σ, of those that do not narrow the bandwidth.
+    """
+    failed = failing(array)
+    limited = {(row["method"], row["definition"]) for row in array.methods() if np.isfinite(row["bandwidth_hz"])}
+    fair = best_method(array, FAIR, lambda name: name not in failed)
+    return fair or best_method(array, RAW, lambda name: name not in failed and name not in limited)
+
+
+def _known(array: ArrayPart, name: Name) -> Mapping[str, Value]:
+    return {metric: value for metric, value in array.values().get(name, {}).items() if value.known}
+
+
+def _labels(array: ArrayPart) -> dict[Name, str]:
+    names = method_labels(array)
+    return {(row["method"], row["definition"]): names[row["column"]] for row in array.methods() if row["column"]}
+
+
+def factors_of(array: ArrayPart) -> tuple[tuple[str, str], ...]:
+    """The factors by which methods are compared: the fair ones; raw 1σ where bandwidths were not made equal."""
+    fair = any(FAIR in known for known in array.values().values())
+    return FACTORS if fair else (RAW_FACTOR, *FACTORS[1:])
+
+
+def rest_sentences(dataset: DatasetPart, array: ArrayPart) -> list[Conclusion]:
+    """The best methods at rest, whether DCC beats the baselines, and what fails at the added rate."""
+    place = f"axis {array.axis}, {array.recording}"
+    failed = failing(array)
+    parts = []
+    for figure, words in factors_of(array):
+        best = best_method(array, figure)
+        if best is None:
+            continue
+        parts.append(f"by {words} {best.label}, improvement factor {factor(best.factor)}")
+        if best.name in failed:
+            holds = best_method(array, figure, lambda name: name not in failed)
+            other = f"; of those that hold {holds.label}, {factor(holds.factor)}" if holds else ""
+            parts[-1] += f" (fails at {plain(array.added_rate)} deg/s{other})"
+    if not parts:
+        return []
+    found = [Conclusion(f"Best method at rest ({place}): {'; '.join(parts)}.", "", array.anchor)]
+    compared = [text for figure, words in factors_of(array) if (text := _dcc_words(array, figure, words))]
+    if compared:
+        found.append(Conclusion(f"Causal DCC ({place}) {'; '.join(compared)}.", "", array.anchor))
+    return found + _failing_sentence(dataset, array, place)
+
+
+def _failing_sentence(dataset: DatasetPart, array: ArrayPart, place: str) -> list[Conclusion]:
+    """Of the methods that fail at the added rate the one that improves most at rest, with its figures; others named."""
+    failed, labels = failing(array), _labels(array)
+    raw = factors_of(array)[0][0]
+
+    def gain(name: Name) -> float:
+        value = _known(array, name).get(raw)
+        return value.value if value else 0.0
+
+    names = sorted((name for name in failed if name in labels), key=gain, reverse=True)
+    if not names:
+        return []
+    first, others = names[0], [labels[name] for name in names[1:]]
+    said = "; ".join(
+        f"{_figure(dataset, figure).title} {significant(after.value)} {after.unit}, at rest {significant(before.value)}"
+        for figure, (before, after) in failed[first].items()
+    )
+    wins = f"improves 1σ {significant(gain(first))} times at rest but " if gain(first) > 1 else ""
+    text = f"{labels[first]} {wins}fails at {plain(array.added_rate)} deg/s ({place}): {said}"
+    more = f"; so {'do' if len(others) > 1 else 'does'} {', '.join(others)}" if others else ""
+    return [Conclusion(f"{text}{more}.", "warn", array.anchor)]
+
+
+def _figure(dataset: DatasetPart, name: str) -> Figure:
+    return dataset.figures.get(name) or Figure(name, "", "")
+
+
+def _dcc_words(array: ArrayPart, figure: str, words: str) -> str:
+    labels = _labels(array)
+    known = {name: _known(array, name)[figure] for name in labels if figure in _known(array, name)}
+    simple = [name for name in known if name[0] in SIMPLE]
+    dcc = [name for name in known if name[0] == "dcc_causal"]
+    if not simple or not dcc:
+        return ""
+    baseline = max(simple, key=lambda name: known[name].value)
+    ours = max(dcc, key=lambda name: known[name].value)
+    verdict = "beats" if known[ours].low > known[baseline].value else "does not beat"
+    figures = f"{interval(known[ours])} with definition {ours[1]} against {significant(known[baseline].value)}"
+    return f"{verdict} the simple baselines by {words}: {figures} of {labels[baseline]}"
+
+
+def motion_sentences(dataset: DatasetPart) -> list[Conclusion]:
+    """The method with the least error in each recording that has a reference."""
+    found = []
+    for array in dataset.arrays:
+        labels = _labels(array)
+        errors = {name: _known(array, name)["error_sigma"] for name in labels if "error_sigma" in _known(array, name)}
+        if errors:
+            best = min(errors, key=lambda name: errors[name].value)
+            text = (
+                f"In motion (axis {array.axis}, {array.recording}) the least error 1σ is {interval(errors[best])} deg/s"
+            )
+            against = (
+                f", against {significant(errors['average', ''].value)} of the average"
+                if ("average", "") in errors
+                else ""
+            )
+            found.append(Conclusion(f"{text}, by {labels[best]}{against}.", "", array.anchor))
+    return found

@@ -1,0 +1,52 @@
+"""Cells of tables of figures: how a value of metrics.parquet reads."""
+
+from __future__ import annotations
+
+from vgyro.report.model import Figure, Value
+from vgyro.report.numbers import MISSING, significant
+from vgyro.report.tables import Cell, Column, Notes, number_cell
+
+NOT_SIGNIFICANT = "not significant"
+NOT_SHOWN = "not shown to exist"
+BAND_LIMITED = "band-limited"
+# Said of nearly every cell: a tooltip will do.
+ROUTINE = (
+    "bootstrap of blocks",
+    "each pose's own mean",
+    "two-sided,",
+    "line through",
+    "fitted from",
+    "limits from the chi²",
+    "one-sided ",
+    "of the error",
+    "low-passed to",
+    BAND_LIMITED,
+)
+
+
+def figure_column(figure: Figure, group: str = "") -> Column:
+    """Head of a column of one figure."""
+    return Column(figure.title, "" if figure.unit == "1" else figure.unit, hint=figure.meaning, group=group)
+
+
+def figure_cell(value: Value | None, metric: str, notes: Notes, *, gyro: bool = False, best: bool = False) -> Cell:
+    """A figure with its interval, or why there is none; factors whose interval holds 1 are grey."""
+    if value is None:
+        hint = "compares a method with the single gyros" if gyro and metric.startswith("if_") else "not computed"
+        return Cell("" if gyro and metric.startswith("if_") else MISSING, tone="muted", hint=hint)
+    if not value.known:
+        return Cell(MISSING, tone="muted", hint=value.note, notes=notes.number(value.note))
+    if value.note.startswith(NOT_SHOWN):
+        return Cell(f"< {significant(value.high, 2)}", tone="muted", hint=value.note)
+    insignificant = value.note.startswith(NOT_SIGNIFICANT)
+    clauses = value.note.split("; ")
+    routine = insignificant or all(clause.startswith(ROUTINE) for clause in clauses)
+    return number_cell(
+        value.value,
+        value.low,
+        value.high,
+        tone="muted" if insignificant else "best" if best else "",
+        notes=() if routine else notes.number(value.note),
+        hint=value.note,
+        mark=BAND_LIMITED if any(clause.startswith(BAND_LIMITED) for clause in clauses) else "",
+    )
