@@ -1,0 +1,99 @@
+"""Columns of frames in pieces: one of them whole, or means of blocks of time of several."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from vgyro.board import Board, Temperature
+from vgyro.storage.tables import read_batches
+
+HALF = 0.5
+
+
+@dataclass(frozen=True)
+class BlockMeans:
+    """Means of blocks that lie within one gap-free segment each.
+
+    seconds : length of a block;  time [M] : mean time of its samples, s;  segment [M];  values : column → [M]
+    """
+
+    seconds: float
+    time: np.ndarray
+    segment: np.ndarray
+    values: dict[str, np.ndarray]
+
+
+def whole_column(frames: Path, name: str) -> np.ndarray:
+    """One column of numbers of a table, read row group by row group: little more memory than it takes itself."""
+    kind = pq.read_schema(frames).field(name).type.to_pandas_dtype()
+    values = np.empty(pq.read_metadata(frames).num_rows, dtype=kind)
+    first = 0
+    for batch in read_batches(frames, [name]):
+        stop = first + len(batch[name])
+        values[first:stop] = batch[name]
+        first = stop
+    return values
+
+
+def block_means(
+    frames: Path, columns: list[str], seconds: float = 1.0, rails: Mapping[str, tuple[float, float]] | None = None
+) -> BlockMeans:
+    """Means of blocks of `seconds` of the recording's clock; the memory is that of a row group and of the means.
+
+    rails : column → counts at which the converter clips; a block with a clipped sample is NaN there
+    Blocks with fewer than half as many samples as usual are left out, and so is what is cut off by a gap.
+    """
+    names = list(dict.fromkeys(columns))
+    blocks: list[np.ndarray] = []
+    rest = {name: np.empty(0) for name in ("time", "segment", *names)}
+    for raw in read_batches(frames, ["time", "segment", *names]):
+        rest = {name: np.concatenate([rest[name], raw[name].astype(float)]) for name in rest}
+        _hide_clipped(rest, rails or {})
+        starts = _starts(rest, seconds)
+        blocks.append(_means(rest, starts, names))
+        rest = {name: values[starts[-1] :] if starts.size else values for name, values in rest.items()}
+    last = np.zeros(1 if rest["time"].size else 0, dtype=np.int64)
+    blocks.append(_means(rest, np.append(last, rest["time"].size) if last.size else last, names))
+    table = np.concatenate(blocks, axis=1)
+    samples = table[0]
+    kept = samples >= HALF * (np.median(samples) if samples.size else 0.0)
+    values = {name: table[3 + index][kept] for index, name in enumerate(names)}
+    return BlockMeans(seconds, table[1][kept], table[2][kept].astype(np.int64), values)
+
+
+def _hide_clipped(columns: dict[str, np.ndarray], rails: Mapping[str, tuple[float, float]]) -> None:
+    for name, (low, high) in rails.items():
+        values = columns[name]
+        values[(values <= low) | (values >= high)] = np.nan
+
+
+def _starts(columns: dict[str, np.ndarray], seconds: float) -> np.ndarray:
+    """Rows where a block begins; the last of them may go on in the next piece."""
+    number, segment = np.floor(columns["time"] / seconds), columns["segment"]
+    new = (np.diff(number, prepend=np.nan) != 0) | (np.diff(segment, prepend=np.nan) != 0)
+    return np.flatnonzero(new)
+
+
+def _means(columns: dict[str, np.ndarray], starts: np.ndarray, names: list[str]) -> np.ndarray:
+    """[samples, time, segment, columns…] of the blocks between two starts, [3 + n, M]."""
+    blocks = max(len(starts) - 1, 0)
+    if blocks == 0:
+        return np.empty((3 + len(names), 0))
+    samples = np.diff(starts)
+    stop = int(starts[-1])
+    sums = [np.add.reduceat(columns[name][:stop], starts[:-1]) for name in ("time", "segment", *names)]
+    return np.vstack([samples, *(total / samples for total in sums)])
+
+
+def thermometer_of(board: Board, gyro: str) -> Temperature | None:
+    """The gyro's own thermometer, else the board's, where it has only one that is nobody else's; else None."""
+    own = [thermometer for thermometer in board.temperatures if thermometer.gyro == gyro]
+    free = [thermometer for thermometer in board.temperatures if thermometer.gyro is None]
+    if own:
+        return own[0]
+    return free[0] if len(free) == 1 else None
