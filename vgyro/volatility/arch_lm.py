@@ -40,7 +40,7 @@ def arch_lm(residual: np.ndarray, lags: int = 1, keep: np.ndarray | None = None)
             remedy=f"It takes at least {2 * lags + 2}",
         )
     used = np.ones(samples, dtype=bool) if keep is None else np.asarray(keep, dtype=bool)
-    rows = np.lib.stride_tricks.sliding_window_view(used, lags + 1).all(axis=1)
+    rows = np.asarray(np.lib.stride_tricks.sliding_window_view(used, lags + 1).all(axis=1))
     if rows.sum() <= lags + 1:
         raise TooShort(f"{rows.sum()} samples are kept with their {lags} lags", remedy="Keep more of them")
     statistic = np.array([_statistic(column, lags, rows) for column in residual.T])

@@ -78,3 +78,27 @@ rule volatility:
         " --output garch {output.garch} --output dcc {output.dcc} --output arch_lm {output.arch_lm}"
         " --output weights {output.weights} --output fits {output.fits}"
         " --options {params.options:q} --code {params.code} --log {log}"
+
+
+rule effects:
+    """What the ARCH effect of each gyro's level is: changing variance, drift, a tone, a knock, or nothing."""
+    input:
+        series="results/{dataset}/{recording}/{axis}/series.parquet",
+        tones="results/{dataset}/{recording}/{axis}/tones.parquet",
+        garch=level_garch,
+    output:
+        effects="results/{dataset}/{recording}/{axis}/effects.parquet",
+    log:
+        "results/logs/{dataset}/{recording}/{axis}/effects.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/{axis}/effects.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        options=stage("board", "engine", "volatility", "metrics", definition="level"),
+        code=code("effects"),
+    shell:
+        "python -m vgyro.tasks.effects --input series {input.series} --input tones {input.tones}"
+        " --input garch {input.garch:q} --output effects {output.effects}"
+        " --options {params.options:q} --code {params.code} --log {log}"
