@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vgyro.engine import ENGINES
-from vgyro.fusion import blocks
+from vgyro.fusion import METHODS, Fused, Method, blocks
 from vgyro.storage.tables import Provenance, TableWriter, read_columns, read_metadata, write_json, write_table
 from vgyro.tasks import crosscheck, fuse, fusion_inputs, series, volatility
 from vgyro.tasks.common import Task
@@ -19,6 +19,8 @@ GYROS = ("g1", "g2", "g3")
 RATE_HZ, SECONDS = 10.0, 400
 DEFINITIONS = ("level", "residual")
 ARW = (0.05, 0.05, 0.15)
+BIAS = (0.02, -0.01, 0.01)
+INJECTED = 0.05
 OUTPUTS = {name: f"{name}.parquet" for name in ("fused", "methods", "moved")}
 ANALYSIS = {
     "volatility": {"window": 120, "step": 40, "definitions": DEFINITIONS},
@@ -44,14 +46,16 @@ def task_of(folder, inputs, outputs, gyros=GYROS, kind="static", **options):
     )
 
 
-def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True, single=False):
+def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True, single=False, turning=0.0):
     """Rates of white gyros, the third three times as noisy; a gap after 3/4; their noise record."""
     samples = int(seconds * RATE_HZ)
     time = np.arange(samples) / RATE_HZ
     segment = np.where(np.arange(samples) < 3 * samples // 4, 0, 1).astype(np.int32)
     time = time + 5.0 * segment
     white = np.random.default_rng(7).standard_normal((samples, len(gyros))) * ARW[: len(gyros)] * np.sqrt(RATE_HZ)
-    rate = (white + motion * np.sin(time)[:, None]).astype(np.float32 if single else float)
+    rate = (white + BIAS[: len(gyros)] + turning + motion * np.sin(time)[:, None]).astype(
+        np.float32 if single else float
+    )
     columns = {"time": time, "segment": segment, "at_rest": np.full(samples, rest)}
     columns |= {gyro: rate[:, index] for index, gyro in enumerate(gyros)}
     write_table(folder / "rates.parquet", columns, "rates", Provenance({}, "", ""), {"rate_hz": RATE_HZ})
@@ -68,10 +72,11 @@ def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True, si
 
 def run_volatility(folder):
     series.main(task_of(folder, {"rates": ["rates.parquet"]}, {"series": "series.parquet"}))
-    for definition in DEFINITIONS:
+    for definition in (*DEFINITIONS, "moved"):
         made = {name: f"{definition}/{name}.parquet" for name in ("garch", "dcc", "arch_lm", "weights", "fits")}
         (folder / definition).mkdir(exist_ok=True)
-        volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, definition=definition))
+        options = {"definition": definition, "injected_rate": INJECTED if definition == "moved" else None}
+        volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, **options))
 
 
 def fuse_in(folder, tables=(), read=True, moved=(), **keywords):
@@ -156,6 +161,78 @@ def test_weights_of_single_samples(tmp_path, monkeypatch):
     assert f"{1 - there.mean():.1%} of the samples" in notes["dcc_in_sample", "level"]
 
 
+def fuse_moved(folder, **keywords):
+    tables = [f"{name}/weights.parquet" for name in DEFINITIONS]
+    fused, methods = fuse_in(folder, tables, moved=["moved/weights.parquet"], **keywords)
+    return fused, methods, read_columns(folder / "moved.parquet")
+
+
+def test_moved_is_another_recording_that_turns(analysed, tmp_path):
+    # Expected: the same gyros, recorded while they turn, through all of series, volatility and fuse, to the depth to
+    # which optima are found.
+    turning = tmp_path / "turning"
+    turning.mkdir()
+    write_inputs(turning, turning=INJECTED)
+    run_volatility(turning)
+    fused, methods, moved = fuse_moved(analysed, injected_rate=INJECTED)
+    expected = fuse_in(turning, [f"{name}/weights.parquet" for name in DEFINITIONS])[0]
+    answering = [f"{model}_{mode}[level]" for model in ("ccc", "dcc") for mode in ("in_sample", "causal")]
+    answering = ["rolling_moment", "ewma_causal", "ewma_two_sided", "jiang_markov", *answering]
+    assert set(moved) == {"time", "segment", *answering}
+    for name in answering:
+        np.testing.assert_allclose(moved[name], expected[name] - INJECTED, atol=1e-4, err_msg=name)
+    said = dict(zip(methods["column"], methods["moved"], strict=True))
+    for column in fused:
+        if column in ("time", "segment", *answering):
+            continue
+        assert said[column].startswith("the same at any constant rate: "), column
+        # What is said to be the same is the same in the recording that turns.
+        np.testing.assert_allclose(fused[column], expected[column] - INJECTED, atol=1e-4, err_msg=column)
+    assert {name: said[name] for name in answering} == {name: name for name in answering}
+    assert said[""] == ""  # of the method that could not run
+    # The rate does something to each of these (of the level it shrinks: tests/fusion/test_constant_rate.py).
+    for name in answering:
+        assert np.abs(moved[name] - fused[name]).max() > 1e-5, name
+    about = read_metadata(analysed / "moved.parquet")
+    assert about["injected_rate"] == INJECTED
+    assert about["rate_hz"] == RATE_HZ
+
+
+@pytest.mark.parametrize(
+    ("keywords", "reason"),
+    [({"kind": "constant", "injected_rate": INJECTED}, "not one at rest"), ({"injected_rate": None}, "null")],
+)
+def test_no_rate_is_added(analysed, keywords, reason):
+    fused, methods, moved = fuse_moved(analysed, **keywords)
+    assert list(moved) == ["time", "segment"]
+    assert len(moved["time"]) == len(fused["time"])
+    said = dict(zip(methods["column"], methods["moved"], strict=True))
+    assert said["average"].startswith("the same at any constant rate")
+    assert said["dcc_causal[level]"].startswith("not known: ")
+    assert reason in said["dcc_causal[level]"]
+
+
+def test_a_response_that_is_not_declared_is_measured(analysed, monkeypatch):
+    # A mean of three samples, the last one of them its own: 1 sample late.
+    def smooth(array, parameters):  # noqa: ARG001
+        mean = np.pad(array.rate.mean(axis=1), (2, 0), mode="edge")
+        return Fused((mean[2:] + mean[1:-1] + mean[:-2]) / 3)
+
+    monkeypatch.setitem(METHODS, "smooth", Method("smooth", "Smooth", "test", True, (), smooth))
+    _, methods, moved = fuse_moved(analysed, injected_rate=INJECTED)
+    row = list(methods["method"]).index("smooth")
+    figures = {name: methods[name][row] for name in ("response", "dc_gain", "delay_s", "moved")}
+    assert figures["response"] == "measured"
+    assert figures["dc_gain"] == pytest.approx(1.0)
+    assert figures["delay_s"] == pytest.approx(1 / RATE_HZ, rel=1e-3)
+    assert figures["moved"] == "smooth"
+    assert moved["smooth"].std() > 0
+    ran = methods["column"] != ""
+    assert np.isfinite(methods["dc_gain"][ran]).all()
+    assert set(methods["response"][ran]) == {"analytic", "measured"}
+    assert set(methods["response"][~ran]) == {""}
+
+
 def test_both_engines_fuse_alike(analysed):
     tables = [f"{name}/weights.parquet" for name in DEFINITIONS]
     native, reference = (fuse_in(analysed, tables, analysis={**ANALYSIS, "engine": name})[0] for name in ENGINES)
@@ -191,14 +268,14 @@ def test_memory_of_a_long_recording(tmp_path):
     # Rates in single precision, segment, rest, numbers of blocks and one fused rate or two: 60 bytes a sample for three
     # gyros. One more array [T, N] in double precision would add 24.
     peaks, lengths = [], (400_000, 1_000_000)
-    some = {**FULL, "fusion": {"methods": ["median", "ewma_two_sided", "xue_2012", "dcc_in_sample"]}}
+    some = {**FULL, "fusion": {"methods": ["median", "ewma_two_sided", "jiang_markov", "dcc_in_sample"]}}
     for samples in lengths:
         write_inputs(tmp_path, seconds=samples / RATE_HZ, single=True)
         time = read_columns(tmp_path / "rates.parquet")["time"]
         (tmp_path / "level").mkdir(exist_ok=True)
         write_weights(tmp_path / "level/weights.parquet", time, [("dcc", "in_sample")], row_group=1 << 16)
         tracemalloc.start()
-        fuse_in(tmp_path, ["level/weights.parquet"], analysis=some, read=False)
+        fuse_in(tmp_path, ["level/weights.parquet"], analysis=some, read=False, injected_rate=INJECTED)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert (peaks[1] - peaks[0]) / (lengths[1] - lengths[0]) < 60
