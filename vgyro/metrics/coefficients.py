@@ -13,6 +13,7 @@ from vgyro.metrics.coefficient_limits import Drawing, Limits, chance_of_gain
 
 __all__ = ["Coefficient", "NoiseCoefficients", "low_pass_factor", "model_deviation", "noise_coefficients"]
 
+FITTED_KINDS = ("overlapping", "robust")
 FEWEST_POINTS = 6
 LARGEST_MISFIT = 5.0
 EVIDENCE = 0.01  # largest probability by chance at which Q or R is taken to exist
@@ -79,6 +80,8 @@ def noise_coefficients(
     Where Q cannot be told from a low-pass, its upper limit is what the curve has room for: 3Q²/τ² <= σ² at every τ.
     Model: IEEE Std 952-1997, annex C.  Low-pass: first-order Gauss-Markov rate, Tc = 1/(2π·bandwidth).
     """
+    if curve.kind not in FITTED_KINDS:
+        raise ValueError(f"no coefficients of a {curve.kind} deviation: its terms have other shapes")
     constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
     used = np.isfinite(curve.deviation) & (curve.edf > 0) & (curve.tau >= 2 * constant)
     if used.sum() < len(BASE):
