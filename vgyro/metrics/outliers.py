@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 NORMAL_MAD = 0.6744897501960817  # median of |z| of a normal z
-NORMAL_80 = 1.2815515655446004  # its 80 % quantile
+NORMAL = (0.68, 0.9944578832097531), (0.8, 1.2815515655446004)  # quantiles of |z|
 BLOCK = 512  # samples that share a scale
 CHUNK = 256  # blocks at a time
 SCREEN = 0.6  # of the threshold: what is looked at closely
-NEAR = 0.7  # of the threshold, against the scale of the nearest samples
+AROUND = 0.85  # of the threshold, against the scale of the samples on both sides
+NEAR = 0.7  # of the threshold, against the scale of one side
 SIDE, LEVEL = 24, 8  # samples on each side that give the near scale, and the level
 REACH = 2  # samples beside a suspect that are looked at, too
 AT_ONCE = 1 << 15
@@ -28,10 +29,11 @@ def find_outliers(
     threshold : distance from the level, in standard deviations of the noise
     returns   : bool [T]
     An outlier is further than `threshold` scales of its second (at least 512 samples) from the level before it and
-    from the level after it, medians of 8 samples each: so a step, a slow motion and a drift are none. And it is further
-    than 0.7·threshold times the noise of the 24 samples before and of the 24 after (80 % quantile about their level):
-    so samples of a noisy stretch that is longer than about ten samples are none. The scale is that of second
-    differences, their median in each block; at least the noise of quantisation.
+    from the level after it, medians of 8 samples about the slope of 24: so a step, a slow motion and a drift are none.
+    That scale is the median of the second differences, or the noise of quantisation where that is more. An outlier is
+    also further than 0.85·threshold times the noise of the 48 samples around it about those slopes (68 % quantile),
+    which is more where the noise is not white, and than 0.7·threshold times that of the 24 samples on either side
+    (80 % quantile): so samples of a noisy stretch of more than about ten samples are none.
     """
     rate = np.asarray(rate)
     flags = np.zeros(len(rate), dtype=bool)
@@ -51,9 +53,12 @@ def find_outliers(
 
 def _resolution(rate: np.ndarray) -> float:
     """Step of quantised rates; of others, a small part of the noise."""
-    steps = np.abs(np.diff(rate[:: max(len(rate) // 100_000, 1)].astype(float)))
-    steps = steps[steps > 0]
-    return float(np.quantile(steps, 0.1)) if steps.size else 0.0
+    for every in (max(len(rate) // 100_000, 1), 1):
+        steps = np.abs(rate[1::every].astype(float) - rate[:-1:every])
+        steps = steps[steps > 0]
+        if steps.size:
+            return float(np.quantile(steps, 0.1))
+    return 0.0
 
 
 def _suspects(rate: np.ndarray, length: int, screen: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
@@ -97,18 +102,32 @@ def _block_medians(bend: np.ndarray, length: int) -> np.ndarray:
 def _far_off(rate: np.ndarray, places: np.ndarray, scale: np.ndarray, threshold: float, floor: float) -> np.ndarray:
     """Which of `places` [K] lie far off the levels before and after, by the scale there and by that of their sides."""
     last = len(rate) - 1
-    distance, near = [], []
+    distance, spread = [], []
+    steps = np.arange(1, SIDE + 1)
     for side in (-1, 1):
-        at = places[:, None] + side * np.arange(1, SIDE + 1)
+        at = places[:, None] + side * steps
         # At the ends of the series the other side stands in.
         at = np.where((at < 0) | (at > last), 2 * places[:, None] - at, at)
         values = rate[np.clip(at, 0, last)].astype(float)
-        level = np.median(values[:, :LEVEL], axis=1)
+        # A line through the medians of both halves of the side follows slow motion.
+        ends = np.median(values.reshape(-1, 2, SIDE // 2), axis=2)
+        slope = (ends[:, 1] - ends[:, 0]) / (SIDE // 2)
+        level = np.median(values[:, :LEVEL] - slope[:, None] * steps[:LEVEL], axis=1)
         distance.append(np.abs(rate[places] - level))
-        spread = np.abs(values - np.median(values, axis=1)[:, None])
-        near.append(np.partition(spread, int(0.8 * SIDE), axis=1)[:, int(0.8 * SIDE)] / NORMAL_80)
+        values -= slope[:, None] * steps
+        spread.append(np.abs(values - np.median(values, axis=1)[:, None]))
     nearest = np.minimum(*distance)
-    return (nearest > threshold * scale) & (nearest > NEAR * threshold * np.maximum(np.maximum(*near), floor))
+    around = _quantile(np.hstack(spread), NORMAL[0])
+    near = np.maximum(*(_quantile(one, NORMAL[1]) for one in spread))
+    limit = np.maximum(scale, np.maximum(AROUND * around, NEAR * np.maximum(near, floor)))
+    return nearest > threshold * limit
+
+
+def _quantile(spread: np.ndarray, normal: tuple[float, float]) -> np.ndarray:
+    """Standard deviation by a quantile of each row."""
+    share, of_normal = normal
+    place = int(share * spread.shape[1])
+    return np.partition(spread, place, axis=1)[:, place] / of_normal
 
 
 def _of_another_level(flags: np.ndarray, segment: np.ndarray) -> np.ndarray:
