@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vgyro.metrics import allan_deviation, block_length, make_units, moments, read_curve, resample
-from vgyro.metrics.bootstrap import scale_limits
+from vgyro.metrics import Sampling, allan_deviation, block_length, make_units, moments, read_curve, resample
+from vgyro.metrics.bootstrap import sampled_grid, scale_limits
 
 
 def first_order(rho: float, samples: int, seed: int) -> np.ndarray:
@@ -31,9 +31,34 @@ def test_units_hold_all_samples_and_no_gap():
     assert units.count.tolist() == [100, 100, 100, 100, 130, 100, 100, 100, 100, 120]
     np.testing.assert_allclose(units.total.sum(axis=0), rate.sum(axis=0))
     np.testing.assert_allclose(units.squares.sum(axis=0), (rate**2).sum(axis=0))
-    # Their second differences are those of the overlapping Allan variance.
-    curve = allan_deviation(rate[:, 0], 100.0, np.array([1.0]), segment)
-    assert units.steps[:, 0].sum() / units.step_count.sum() == pytest.approx(curve.deviation[0] ** 2)
+    # Their second differences are those of the overlapping Allan variance; at 7 Hz no part of a second is longer than a
+    # sample, and no difference is left out.
+    slow = make_units(rate, 7.0, segment)
+    curve = allan_deviation(rate[:, 0], 7.0, np.array([1.0]), segment)
+    assert slow.steps[:, 0].sum() / slow.step_count.sum() == pytest.approx(curve.deviation[0] ** 2)
+
+
+def test_units_of_samples_with_short_losses():
+    # By hand, at 4 Hz: slots 0-7 without 5, then 20-23 in another stretch. A unit keeps the samples of its second.
+    position = np.array([0, 1, 2, 3, 4, 6, 7, 20, 21, 22, 23])
+    grid = sampled_grid(Sampling(4.0, position, np.repeat([0, 1], [7, 4]).astype(np.int32)))
+    units = grid.units_of(np.arange(11.0))
+    assert units.count.tolist() == [4, 3, 4]
+    assert units.total[:, 0].tolist() == [6, 15, 34]
+    places, seconds = grid.seconds()
+    assert len(places) == 2  # the second unit lacks a quarter
+    assert seconds.stretch.tolist() == [0, 1]
+    np.testing.assert_allclose(grid.means_of(grid.sums_of(np.arange(11.0))[0], places), [1.5, 8.5])
+    assert units.step_count.sum() == 0
+
+
+def test_each_statistic_has_its_own_blocks():
+    # A random walk under white noise: the mean has a long memory, the squared differences at 1 s have none.
+    rng = np.random.default_rng(7)
+    units = make_units(rng.standard_normal((4000, 1)) + np.cumsum(rng.standard_normal((4000, 1)))[:, None] / 10, 1.0)
+    blocks = resample(units, 10, 1).blocks
+    assert blocks["mean"] > 10 * blocks["adev_1s"]
+    assert blocks["adev_1s"] < 40
 
 
 def test_same_seed_same_replicates():

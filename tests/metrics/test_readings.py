@@ -10,6 +10,7 @@ from vgyro.metrics import (
     FIGURES,
     AllanCurve,
     LowPass,
+    Sampling,
     allan_deviation,
     improvement_factor,
     improvement_of_deviation,
@@ -25,6 +26,10 @@ from vgyro.metrics.readings import bias_drift, rrw_read
 
 N, K = 6.17 / 60, 294.28 / 216000  # Jiang et al. (2012), table 2
 OPTIONS = MetricsOptions(bootstrap=200)
+
+
+def even(samples: int) -> Sampling:
+    return Sampling.of(50.0, np.zeros(samples, dtype=int))
 
 
 def curve_of(function, seconds: float = 3600.0) -> AllanCurve:
@@ -72,7 +77,7 @@ def test_average_of_white_gyros_gains_root_n():
     rng = np.random.default_rng(2)
     gyros = 0.02 + N * np.sqrt(50.0) * rng.standard_normal((90_000, 6))
     values = np.column_stack([gyros, gyros.mean(axis=1)])
-    found = static_figures(values.T, 50.0, np.zeros(90_000, dtype=int), 6, [LowPass()] * 7, OPTIONS).readings
+    found = static_figures(values.T, even(90_000), 6, [LowPass()] * 7, OPTIONS).readings
     for name in ("if_sigma", "if_arw_1s", "if_bias_drift"):
         factor = found[6][name]
         assert factor.low <= math.sqrt(6) <= factor.high, name
@@ -105,29 +110,34 @@ def test_factor_takes_the_magnitude_of_a_mean():
     assert "zero" in improvement_factor(np.array([1.0]), 0.0, replicates[:, :1], np.zeros(2)).note
 
 
-def test_factor_of_a_deviation_by_f():
-    # Against scipy: the ratio of two equal variances is F distributed.
-    from scipy.stats import f
-
-    factor = improvement_of_deviation(np.array([2.0]), 1.0, np.array([8.0]), 12.0)
-    assert factor.low == pytest.approx(2 / math.sqrt(f.ppf(0.975, 8, 12)))
-    assert factor.high == pytest.approx(2 / math.sqrt(f.ppf(0.025, 8, 12)))
+def test_factor_of_a_deviation_by_its_errors():
+    # Independent figures: the logarithm of the ratio has the sum of both variances. Wholly correlated: nothing is left.
+    independent = improvement_of_deviation(np.array([2.0]), 1.0, np.array([0.01, 0.02]), np.eye(2))
+    assert independent.value == 2.0
+    assert np.log(independent.high / 2.0) == pytest.approx(1.959964 * math.sqrt(0.03), rel=1e-6)
+    assert independent.low * independent.high == pytest.approx(4.0)
+    same = improvement_of_deviation(np.array([2.0]), 1.0, np.array([0.01, 0.01]), np.ones((2, 2)))
+    assert same.high == pytest.approx(2.0)
+    none = improvement_of_deviation(np.array([1.05]), 1.0, np.array([0.01, 0.02]), np.eye(2))
+    assert "not significant" in none.note
+    unknown = improvement_of_deviation(np.array([2.0]), 1.0, np.array([0.01, np.inf]), np.eye(2))
+    assert math.isnan(unknown.low)
 
 
 def test_poses_do_not_enter_sigma():
     rng = np.random.default_rng(3)
     segment = np.repeat(np.arange(10), 1500)
     values = rng.standard_normal((15_000, 2)) + 5 * rng.standard_normal((10, 1))[segment]
-    found = static_figures(values.T, 50.0, segment, 2, [LowPass()] * 2, OPTIONS, poses=True).readings
+    found = static_figures(values.T, Sampling.of(50.0, segment), 2, [LowPass()] * 2, OPTIONS, poses=True).readings
     assert found[0]["sigma"].value == pytest.approx(1.0, rel=0.02)
     assert "pose" in found[0]["sigma"].note
-    joined = static_figures(values.T, 50.0, segment, 2, [LowPass()] * 2, OPTIONS).readings
+    joined = static_figures(values.T, Sampling.of(50.0, segment), 2, [LowPass()] * 2, OPTIONS).readings
     assert joined[0]["sigma"].value > 2
 
 
 def test_constant_series_has_figures():
     values = np.column_stack([np.full(3000, 0.5), np.random.default_rng(4).standard_normal(3000)])
-    found = static_figures(values.T, 50.0, np.zeros(3000, dtype=int), 1, [LowPass()] * 2, OPTIONS).readings
+    found = static_figures(values.T, even(3000), 1, [LowPass()] * 2, OPTIONS).readings
     assert found[0]["sigma"].value == 0
     assert found[0]["arw"].value == 0
     assert found[0]["bias_drift"].value == 0

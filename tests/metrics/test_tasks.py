@@ -14,8 +14,9 @@ from vgyro.tasks.common import Task
 NOWHERE = Provenance({}, "", "")
 RATE_HZ = 50.0
 N = 0.1
+INJECTED = 0.05
 OPTIONS = {"analysis": {"metrics": {"bootstrap": 60, "welch_s": 20.0}, "engine": "reference"}, "axis": "z"}
-TABLES = ("allan", "spectrum", "metrics", "correlation")
+TABLES = ("allan", "spectrum", "metrics", "correlation", "cross_allan", "tones")
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,14 @@ def gyros_of(board: Board) -> list[str]:
     return [gyro.name for gyro in board.array(board.axes[0])]
 
 
-def write_rates(folder: Path, board: Board, rate: np.ndarray, at_rest: np.ndarray, reference: np.ndarray | None = None):
+def write_rates(
+    folder: Path,
+    board: Board,
+    rate: np.ndarray,
+    at_rest: np.ndarray,
+    reference: np.ndarray | None = None,
+    moved: dict | None = None,
+):
     columns = {
         "time": np.arange(len(rate)) / RATE_HZ,
         "segment": np.zeros(len(rate), np.int32),
@@ -40,6 +48,13 @@ def write_rates(folder: Path, board: Board, rate: np.ndarray, at_rest: np.ndarra
     fused = {"time": columns["time"], "segment": columns["segment"], "average": rate.mean(axis=1)}
     fused["dcc_causal[level]"] = rate[:, :2].mean(axis=1)
     write_table(folder / "fused.parquet", fused, "fused", NOWHERE)
+    write_table(
+        folder / "moved.parquet",
+        moved or {"time": columns["time"], "segment": columns["segment"]},
+        "moved",
+        NOWHERE,
+        {"injected_rate": INJECTED},
+    )
     methods = {
         "method": ["average", "dcc_causal", "jiang_markov"],
         "definition": ["", "level", ""],
@@ -57,7 +72,7 @@ def run_noise(folder: Path, board: Board) -> dict:
 
 
 def run_measure(folder: Path, board: Board, kind: str) -> dict[tuple[str, str, str], dict[str, object]]:
-    inputs = {name: [folder / f"{name}.parquet"] for name in ("rates", "fused", "methods")}
+    inputs = {name: [folder / f"{name}.parquet"] for name in ("rates", "fused", "methods", "moved")}
     options = {**OPTIONS, "axis": board.axes[0], "board": board.model_dump(mode="json"), "recording": "r", "kind": kind}
     measure.main(Task(inputs, {name: folder / f"{name}.parquet" for name in TABLES}, options, ""))
     table = read_columns(folder / "metrics.parquet")

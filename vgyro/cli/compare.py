@@ -1,8 +1,8 @@
 """Compare the figures of two runs: which changed, by how much, and whether beyond their intervals.
 
 A and B are results folders (results/<dataset>, or any folder below or above it) or two metrics.parquet files. Figures
-are matched by recording, axis, method, definition and metric. A figure counts as different when |B - A| is more than
-the tolerance times the larger of |A| and |B|, or when only one run has it.
+are matched by recording, axis, method, definition, true rate and metric. A figure counts as different when |B - A| is
+more than the tolerance times the larger of |A| and |B|, or when only one run has it.
 """
 
 from __future__ import annotations
@@ -121,6 +121,9 @@ def read_figures(path: Path) -> dict[str, Figure]:
         prefix = [] if path.is_file() else list(file.relative_to(path).parts[:-3])
         for row in range(len(table["value"])):
             names = [*prefix, *(str(table[column][row] or "") for column in KEY)]
+            # A table of an older release knows the recording as it is alone.
+            rate = float(table["true_rate"][row]) if "true_rate" in table else 0.0
+            names += [f"at {rate:g} deg/s"] if rate else []
             name = " ".join(part for part in names if part)
             value, low, high = (float(table[column][row]) for column in ("value", "low", "high"))
             figures[name] = Figure(value, low, high, str(table["unit"][row]))

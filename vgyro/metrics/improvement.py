@@ -1,4 +1,4 @@
-"""Improvement factors of a virtual gyro over its single gyros, with intervals."""
+"""Improvement factors of a virtual gyro over its single gyros, with intervals of both taken together."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from vgyro.metrics.bootstrap import percentile_limits, scale_limits
 from vgyro.metrics.figures import Reading
 
 NOT_SIGNIFICANT = "not significant"
+NOT_KNOWN = "the virtual gyro's figure is zero or not known"
 ROUNDING = 1e-9
 
 
@@ -30,41 +31,91 @@ def improvement_factor(
     returns : Reading, limits by percentiles; note "not significant" where they hold 1
     """
     if virtual == 0 or not math.isfinite(virtual):
-        return Reading(math.nan, math.nan, math.nan, "the virtual gyro's figure is zero or not known")
-    value = float(np.mean(np.abs(singles)) / abs(virtual))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.mean(np.abs(singles_replicates), axis=1) / np.abs(virtual_replicates)
-    ratios = ratios[np.isfinite(ratios)]
+        return Reading(math.nan, math.nan, math.nan, NOT_KNOWN)
+    value = _ratio(singles, virtual)
+    ratios = _ratios(singles_replicates, virtual_replicates)
     if ratios.size == 0:
         return Reading(value, math.nan, math.nan, "no interval: the resampled figure is zero")
     if of_size:
         low, high = scale_limits(value, ratios, confidence)
     else:
         low, high = (float(limit[0]) for limit in percentile_limits(ratios[:, None], confidence))
-    return Reading(value, low, high, _note(low, high))
+    return Reading(value, low, high, significance(low, high))
+
+
+def improvement_by_draws(
+    singles: np.ndarray,
+    virtual: float,
+    singles_drawn: np.ndarray,
+    virtual_drawn: np.ndarray,
+    expected: float,
+    confidence: float = 0.95,
+) -> Reading:
+    """IF with limits from series drawn by a model in which the factor is `expected`.
+
+    singles [N], virtual : the figure;  singles_drawn [R, N], virtual_drawn [R] : of the same draws
+    The share of the true factor that the draws find is taken to be that which the recording has found.
+    """
+    if virtual == 0 or not math.isfinite(virtual):
+        return Reading(math.nan, math.nan, math.nan, NOT_KNOWN)
+    value = _ratio(singles, virtual)
+    ratios = _ratios(singles_drawn, virtual_drawn)
+    if ratios.size == 0 or not expected > 0:
+        return Reading(value, math.nan, math.nan, "no interval: the drawn figure is zero")
+    tail = (1 - confidence) / 2
+    above, below = np.quantile(ratios / expected, [1 - tail, tail])
+    low, high = value / float(above), value / float(below)
+    return Reading(value, low, high, significance(low, high))
 
 
 def improvement_of_deviation(
-    singles: np.ndarray, virtual: float, singles_edf: np.ndarray, virtual_edf: float, confidence: float = 0.95
+    singles: np.ndarray, virtual: float, variance: np.ndarray, correlation: np.ndarray, confidence: float = 0.95
 ) -> Reading:
-    """IF of an Allan deviation with limits from the chi² of both curves (an F distribution of the ratio squared).
+    """IF of a size from the standard error of its logarithm: of N, or of an Allan deviation of many edf.
 
-    singles [N], singles_edf [N] : deviations of the single gyros and their degrees of freedom;  virtual, virtual_edf :
-    of the virtual gyro. The two sides are taken as independent, which they are not: the interval is too wide.
+    singles [N], virtual : the figure
+    variance [N + 1]     : of the logarithm of each, 1/(2·edf); the virtual gyro is the last
+    correlation [N + 1, N + 1] : of the noise that the figures are sizes of. Mean squares of Gaussian noise correlate
+    by its square (Isserlis 1918); where one of the two was found from fewer data, these are a part of the other's, and
+    the covariance is the variance of the better one.
     """
-    from scipy.special import fdtri
-
     if virtual == 0 or not math.isfinite(virtual):
-        return Reading(math.nan, math.nan, math.nan, "the virtual gyro's figure is zero or not known")
-    value = float(np.mean(singles) / virtual)
-    # The mean of N deviations varies like one with the degrees of freedom of this weighted sum (Satterthwaite).
-    freedom = float(np.sum(singles) ** 2 / np.sum(singles**2 / singles_edf)) if np.any(singles) else 1.0
-    tail = (1 - confidence) / 2
-    low = value / math.sqrt(fdtri(freedom, virtual_edf, 1 - tail))
-    high = value / math.sqrt(fdtri(freedom, virtual_edf, tail))
-    note = "limits from the chi² of both curves, taken as independent"
-    return Reading(value, low, high, f"{_note(low, high)}; {note}".removeprefix("; "))
+        return Reading(math.nan, math.nan, math.nan, NOT_KNOWN)
+    value = _ratio(singles, virtual)
+    if not (value > 0 and np.isfinite(variance).all()):
+        return Reading(value, math.nan, math.nan, "no interval: a figure or its limits are not known")
+    share = np.append(np.abs(singles) / np.sum(np.abs(singles)), -1.0)
+    covariance = correlation**2 * np.minimum(variance[:, None], variance)
+    covariance[range(len(variance)), range(len(variance))] = variance
+    error = math.sqrt(max(float(share @ covariance @ share), 0.0))
+    half = math.exp(normal_quantile(confidence) * error)
+    return Reading(value, value / half, value * half, significance(value / half, value * half))
 
 
-def _note(low: float, high: float) -> str:
+def significance(low: float, high: float) -> str:
+    """What the limits of a factor say."""
     return NOT_SIGNIFICANT if low <= 1 + ROUNDING and high >= 1 - ROUNDING else ""
+
+
+def log_variance(reading: Reading, confidence: float = 0.95) -> float:
+    """Variance of the logarithm of a size, from its limits; infinite where they hold 0."""
+    if not (reading.value > 0 and reading.low > 0 and math.isfinite(reading.high)):
+        return math.inf
+    return (math.log(reading.high / reading.low) / (2 * normal_quantile(confidence))) ** 2
+
+
+def _ratio(singles: np.ndarray, virtual: float) -> float:
+    return float(np.mean(np.abs(singles)) / abs(virtual))
+
+
+def _ratios(singles: np.ndarray, virtual: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.mean(np.abs(singles), axis=1) / np.abs(virtual)
+    return ratios[np.isfinite(ratios)]
+
+
+def normal_quantile(confidence: float) -> float:
+    """Half width of a two-sided interval, in standard errors."""
+    from scipy.special import ndtri
+
+    return float(ndtri(0.5 + confidence / 2))

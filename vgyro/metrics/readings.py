@@ -12,12 +12,15 @@ from vgyro.metrics.allan import AllanCurve, read_curve
 from vgyro.metrics.bootstrap import Units, percentile_limits, resample, scale_limits
 from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, low_pass_factor
 from vgyro.metrics.figures import Reading
+from vgyro.metrics.improvement import log_variance, normal_quantile
 from vgyro.metrics.spectrum import Spectrum, flat_band, noise_density
 
 K_AT_TAU = 3.0  # s: there the slope +1/2 line equals K
 BEYOND_MINIMUM = 2.0
 BAND_LIMITED = 0.98
+BAND_LIMITED_WORD = "band-limited"
 FEWEST_FREEDOM = 1.0
+AGREEMENT = 0.01  # noise density and N, which are the same for white noise
 
 
 def paper_readings(
@@ -26,23 +29,28 @@ def paper_readings(
     coefficients: NoiseCoefficients,
     rate_hz: float,
     bandwidth_hz: float | None = None,
+    dc_gain: float = 1.0,
 ) -> dict[str, Reading]:
-    """Noise density, ARW, RRW, bias drift and bias instability of one series in the units of the field.
+    """Noise density, ARW, RRW, bias drift, bias instability, quantisation and ramp of one series in the field's units.
 
     curve, spectrum, coefficients : of the series, in deg/s
-    bandwidth_hz : -3 dB bandwidth of a filter that the series went through; None: none
-    returns : noise_density deg/s/√Hz (two-sided), arw_1s and arw deg/√h, rrw_read and rrw deg/h/√h, bias_drift and
-              bias_instability deg/h, bias_drift_tau s
+    bandwidth_hz, dc_gain : -3 dB bandwidth (None: not limited) and gain for a constant of a filter that it went through
+    returns : noise_density deg/s/√Hz (two-sided), arw_1s and arw deg/√h, density_ratio, quantisation deg, rrw_read and
+              rrw deg/h/√h, rate_ramp deg/h², bias_drift and bias_instability deg/h, bias_drift_tau s
     Jiang et al. (2012), table 2; Liu et al. (2015), table 3; IEEE Std 952-1997 for the fitted terms.
     """
     density = noise_density(spectrum, flat_band(rate_hz, bandwidth_hz), curve.confidence)
     drift, drift_tau = bias_drift(curve)
+    level = Reading(density.value, density.low, density.high, _density_note(density.value, density.band))
     return {
-        "noise_density": Reading(density.value, density.low, density.high, _density_note(density.value, density.band)),
+        "noise_density": level,
         "arw_1s": _arw_at_one_second(curve, bandwidth_hz),
         "arw": _fitted(coefficients.N, units.arw_deg_rt_h, coefficients.note),
+        "density_ratio": density_ratio(level, coefficients.N, curve.confidence, dc_gain),
+        "quantisation": _fitted(coefficients.Q, float, coefficients.note),
         "rrw_read": rrw_read(curve),
         "rrw": _fitted(coefficients.K, units.rrw_deg_h_rt_h, coefficients.note),
+        "rate_ramp": _fitted(coefficients.R, units.ramp_deg_h2, coefficients.note),
         "bias_drift": drift,
         "bias_drift_tau": drift_tau,
         "bias_instability": _fitted(coefficients.B, units.deg_h, coefficients.note),
@@ -62,18 +70,47 @@ def moments(
     mean = one.total.sum() / count
     centred = one.squares[:, 0] - 2 * mean * one.total[:, 0] + one.count * mean**2
     sigma = math.sqrt(max(centred.sum(), 0.0) / max(count - 1, 1))
-    note = f"bootstrap of blocks of {drawn.block} s"
+    notes = {name: f"bootstrap of blocks of {drawn.blocks[name]} s" for name in ("mean", "sigma")}
     low, high = percentile_limits(drawn.mean, confidence)
     return {
-        "mean": Reading(float(mean), float(low[0]), float(high[0]), note),
-        "sigma": Reading(sigma, *scale_limits(sigma, drawn.sigma[:, 0], confidence), note),
+        "mean": Reading(float(mean), float(low[0]), float(high[0]), notes["mean"]),
+        "sigma": Reading(sigma, *scale_limits(sigma, drawn.sigma[:, 0], confidence), notes["sigma"]),
     }
+
+
+def density_ratio(density: Reading, n: Coefficient, confidence: float, dc_gain: float = 1.0) -> Reading:
+    """Noise density over N, both two-sided and at a DC gain of 1; the limits take both as independent.
+
+    For white noise it is 1: √2 between a one-sided density and N. Where it is off by more than 1 % and its limits leave
+    1 out, tones, drift or a low-pass share the band of one of the two, and the note says so.
+    """
+    if not (n.value > 0 and density.value > 0):
+        return Reading(math.nan, math.nan, math.nan, "density or N is not known")
+    value = density.value / dc_gain / n.value
+    variance = log_variance(density, confidence) + log_variance(Reading(n.value, n.low, n.high), confidence)
+    if not math.isfinite(variance):
+        return Reading(value, math.nan, math.nan, "no interval: N is not shown to exist")
+    half = math.exp(normal_quantile(confidence) * math.sqrt(variance))
+    low, high = value / half, value * half
+    agrees = low <= 1 <= high or abs(value - 1) <= AGREEMENT
+    return Reading(value, low, high, "" if agrees else "density and N differ: the noise is not white in both bands")
+
+
+def counted(number: int) -> Reading:
+    """A count of samples."""
+    return Reading(float(number), math.nan, math.nan)
+
+
+def lowest_point(curve: AllanCurve) -> int:
+    """Index of the lowest point of a curve that has a degree of freedom."""
+    usable = curve.edf >= FEWEST_FREEDOM
+    return int(np.argmin(np.where(usable, curve.deviation, np.inf))) if usable.any() else 0
 
 
 def bias_drift(curve: AllanCurve) -> tuple[Reading, Reading]:
     """Lowest point of the curve, deg/h, and its τ, s; limits are those of the curve at that τ."""
     usable = curve.edf >= FEWEST_FREEDOM
-    index = int(np.argmin(np.where(usable, curve.deviation, np.inf))) if usable.any() else 0
+    index = lowest_point(curve)
     falls = index == len(curve.tau) - 1 or not usable[index + 1 :].any()
     note = "the curve still falls at its end: an upper limit of the floor" if falls else ""
     low, value, high = (float(units.deg_h(row[index])) for row in (curve.low, curve.deviation, curve.high))
@@ -109,7 +146,7 @@ def _arw_at_one_second(curve: AllanCurve, bandwidth_hz: float | None) -> Reading
     if bandwidth_hz:
         kept = math.sqrt(float(low_pass_factor(np.array([1.0]), 1 / (2 * math.pi * bandwidth_hz))[0]))
         if kept < BAND_LIMITED:
-            note = f"band-limited: the filter by itself lowers σ(1 s) to {kept:.2f} of the white level"
+            note = f"{BAND_LIMITED_WORD}: the filter by itself lowers σ(1 s) to {kept:.2f} of the white level"
     return Reading(value, low, high, note)
 
 

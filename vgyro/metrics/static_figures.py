@@ -3,133 +3,218 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vgyro.config import MetricsOptions
-from vgyro.metrics.allan import AllanCurve, allan_deviation, split_segments, stretches
-from vgyro.metrics.bootstrap import Resampled, Units, joined, resample, unit_grid
-from vgyro.metrics.coefficients import noise_coefficients
+from vgyro.metrics.allan import AllanCurve
+from vgyro.metrics.array_moments import ArrayMoments, array_moments
+from vgyro.metrics.bootstrap import Resampled, joined, resample
+from vgyro.metrics.cross_allan import CrossAllan, cross_allan
+from vgyro.metrics.drift import Drawn, DriftModel, draw, fit_drift
+from vgyro.metrics.equal_bandwidth import SETTLED, LowPass, common_bandwidth
 from vgyro.metrics.figures import Reading
-from vgyro.metrics.improvement import improvement_factor, improvement_of_deviation
-from vgyro.metrics.readings import moments, paper_readings
-from vgyro.metrics.spectrum import Spectrum, spectral_density
+from vgyro.metrics.improvement import (
+    improvement_by_draws,
+    improvement_factor,
+    improvement_of_deviation,
+    log_variance,
+)
+from vgyro.metrics.readings import BAND_LIMITED_WORD, lowest_point
+from vgyro.metrics.sampling import Sampling
+from vgyro.metrics.spectrum import Spectrum
+from vgyro.metrics.static_series import Measured, RestRecording, without_means
 
 POSE_NOTE = "each pose's own mean is removed"
+RESOLVED = 3  # blocks of the drawn series that the minimum of a curve must span
 
-
-@dataclass(frozen=True)
-class LowPass:
-    """What a method does to a series: -3 dB bandwidth, Hz (None: not limited), and gain for a constant rate."""
-
-    bandwidth_hz: float | None = None
-    dc_gain: float = 1.0
+__all__ = ["LowPass", "StaticFigures", "array_figures", "static_figures", "without_means"]
 
 
 @dataclass(frozen=True)
 class StaticFigures:
-    """Of each of S series: Allan curve, spectrum, figures by name (vgyro.metrics.FIGURES)."""
+    """Of each of S series: Allan curves by kind, spectrum, figures by name (vgyro.metrics.FIGURES).
 
-    curves: list[AllanCurve]
+    cross : Allan covariances of all series; None: no stretch is long enough
+    """
+
+    curves: list[dict[str, AllanCurve]]
     spectra: list[Spectrum]
     readings: list[dict[str, Reading]]
+    cross: CrossAllan | None
 
 
 def static_figures(
     series: Iterable[np.ndarray],
-    rate_hz: float,
-    segment: np.ndarray,
+    sampling: Sampling,
     singles: int,
-    filters: list[LowPass],
+    filters: Sequence[LowPass],
     options: MetricsOptions,
     engine: str = "native",
     poses: bool = False,
 ) -> StaticFigures:
     """Figures of series at rest, which are taken one by one: only one of them needs to be in memory.
 
-    series  : S arrays [T], deg/s; the first `singles` are the gyros, the others virtual gyros
-    segment : array [T] int, number of the stretch at rest and without a gap
-    filters : S, what each series went through
-    poses   : the stretches are different poses: 1σ is then taken about each pose's own mean, because gravity and
-              switch-on change the bias from pose to pose
-    returns : StaticFigures; virtual gyros also get improvement factors
-    raises  : TooShort if no stretch has three samples
+    series   : S arrays [T], deg/s; the first `singles` are the gyros, the others virtual gyros
+    sampling : when the samples were taken; its stretches are never joined
+    filters  : S, what each series went through
+    poses    : the stretches are different poses: 1σ is then taken about each pose's own mean, because gravity and
+               switch-on change the bias from pose to pose
+    returns  : StaticFigures; virtual gyros also get improvement factors
+    raises   : TooShort if no stretch has three samples
     """
-    curves, spectra, readings = [], [], []
-    sums: list[Units] = []
-    inside: list[Units] = []
-    grid = unit_grid(stretches(segment), rate_hz)
-    for values, low_pass in zip(series, filters, strict=True):
-        curve = allan_deviation(
-            values, rate_hz, None, segment, options.confidence, engine, per_octave=options.taus_per_octave
+    bandwidth_hz = common_bandwidth(filters, options.equal_bandwidth_hz)
+    shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses)
+    return array_figures(shared, [shared.measure(*one) for one in zip(series, filters, strict=True)], singles)
+
+
+def array_figures(shared: RestRecording, measured: Sequence[Measured], singles: int) -> StaticFigures:
+    """Figures that need all series of a recording: moments with common replicates, and improvement factors.
+
+    measured : S, the first `singles` are the gyros
+    """
+    array = _Array.of(shared, measured, singles)
+    confidence = shared.options.confidence
+    readings = [dict(one.readings) for one in measured]
+    for row, found in zip(readings, array.moments.readings(confidence), strict=True):
+        row.update(found)
+        if shared.poses:
+            row["sigma"] = replace(row["sigma"], note=f"{POSE_NOTE}; {row['sigma'].note}")
+    _add_equal(readings, shared, array, confidence)
+    for column in range(singles, len(measured)):
+        readings[column].update(array.factors(readings, column, confidence))
+    return StaticFigures([one.curves for one in measured], [one.spectrum for one in measured], readings, array.cross)
+
+
+@dataclass(frozen=True)
+class _Array:
+    """All series of a recording, and their replicates.
+
+    drawn : None where the recording is too short for a model of its drift
+    """
+
+    measured: Sequence[Measured]
+    singles: int
+    resampled: Resampled
+    cross: CrossAllan | None
+    model: DriftModel | None
+    drawn: Drawn | None
+    moments: ArrayMoments
+    equal: ArrayMoments | None
+
+    @classmethod
+    def of(cls, shared: RestRecording, measured: Sequence[Measured], singles: int) -> _Array:
+        options, unit_s = shared.options, shared.grid.unit_s
+        sums = joined([one.sums for one in measured])
+        resampled = resample(sums, options.bootstrap, options.seed)
+        cross = _cross(shared, measured)
+        # A low-pass is felt up to a few of its time constants.
+        limits = [one.low_pass.bandwidth_hz for one in measured if one.low_pass.bandwidth_hz]
+        if shared.equaliser is not None:
+            limits.append(shared.equaliser.bandwidth_hz)
+        felt = SETTLED / (2 * math.pi * min(limits)) if limits else 0.0
+        model = None if cross is None else fit_drift(cross, singles, felt)
+        drawn = None if model is None else _draw(model, shared, measured, felt)
+        inside = [one.inside for one in measured if one.inside is not None]
+        moments = array_moments(sums, joined(inside) if inside else None, resampled, drawn, unit_s, options)
+        same = [one.equal for one in measured if one.equal is not None]
+        equal = None
+        if len(same) == len(measured):
+            gain = np.array([one.low_pass.dc_gain for one in measured])
+            at_gain = None if drawn is None else drawn.scaled(1 / gain)
+            units = joined(same)
+            of_them = resample(units, options.bootstrap, options.seed)
+            equal = array_moments(units, None, of_them, at_gain, unit_s, options)
+        return cls(measured, singles, resampled, cross, model, drawn, moments, equal)
+
+    def factors(self, readings: list[dict[str, Reading]], column: int, confidence: float) -> dict[str, Reading]:
+        """Improvement factors of one virtual gyro."""
+        number, adev = self.singles, self.resampled.adev_1s
+        at_one = self._improvement(readings, "arw_1s", column, adev, confidence)
+        if BAND_LIMITED_WORD in readings[column]["arw_1s"].note:
+            at_one = replace(at_one, note=f"{at_one.note}; the low-pass takes part in it".removeprefix("; "))
+        found = {
+            "if_mean": self.moments.mean_factor(number, column, confidence),
+            "if_sigma": self.moments.sigma_factor(number, column, confidence),
+            "if_arw_1s": at_one,
+            "if_arw": self._noise_factor(readings, column, confidence),
+            "if_bias_drift": self._drift_factor(readings, column, confidence),
+        }
+        if self.equal is not None:
+            found["if_sigma_equal"] = self.equal.sigma_factor(number, column, confidence)
+        return found
+
+    def _improvement(
+        self, readings: list[dict[str, Reading]], name: str, column: int, drawn: np.ndarray, confidence: float
+    ) -> Reading:
+        figures = np.array([row[name].value for row in readings])
+        number = self.singles
+        return improvement_factor(
+            figures[:number], float(figures[column]), drawn[:, :number], drawn[:, column], confidence
         )
-        spectrum = spectral_density(values, rate_hz, options.welch_s, segment)
-        fitted = noise_coefficients(curve, low_pass.bandwidth_hz, low_pass.dc_gain, options.bootstrap, options.seed)
-        curves.append(curve)
-        spectra.append(spectrum)
-        readings.append(paper_readings(curve, spectrum, fitted, rate_hz, low_pass.bandwidth_hz))
-        sums.append(grid.units_of(values))
-        if poses:
-            inside.append(grid.units_of(without_means(values, segment)))
-    drawn = _add_moments(readings, joined(sums), joined(inside) if poses else None, options)
-    for column in range(singles, len(filters)):
-        readings[column].update(_factors(readings, curves, drawn, singles, column, options.confidence))
-    return StaticFigures(curves, spectra, readings)
+
+    def _noise_factor(self, readings: list[dict[str, Reading]], column: int, confidence: float) -> Reading:
+        chosen = [*range(self.singles), column]
+        fitted = [readings[one]["arw"] for one in chosen]
+        variance = np.array([log_variance(one, confidence) for one in fitted])
+        values = np.array([one.value for one in fitted])
+        correlation = np.eye(len(chosen)) if self.model is None else self.model.correlation(0)[np.ix_(chosen, chosen)]
+        return improvement_of_deviation(values[:-1], float(values[-1]), variance, correlation, confidence)
+
+    def _drift_factor(self, readings: list[dict[str, Reading]], column: int, confidence: float) -> Reading:
+        number, drawn = self.singles, self.drawn
+        chosen = [*range(number), column]
+        points = [lowest_point(self.measured[one].curve) for one in chosen]
+        curves = [self.measured[one].curve for one in chosen]
+        tau = np.array([curve.tau[point] for curve, point in zip(curves, points, strict=True)])
+        lowest = np.array([readings[one]["bias_drift"].value for one in chosen])
+        if drawn is not None and tau.min() >= RESOLVED * drawn.block_s:
+            expected = drawn.lowest_expected
+            centre = float(np.mean(expected[:number]) / expected[column])
+            draws = drawn.lowest
+            return improvement_by_draws(
+                lowest[:-1], float(lowest[-1]), draws[:, :number], draws[:, column], centre, confidence
+            )
+        # The minimum lies where the degrees of freedom are many: those at its τ tell its error.
+        freedom = np.array([max(curve.edf[point], 1.0) for curve, point in zip(curves, points, strict=True)])
+        correlation = np.eye(len(chosen))
+        if self.model is not None:
+            correlation = self.model.correlation(float(tau[-1]))[np.ix_(chosen, chosen)]
+        found = improvement_of_deviation(lowest[:-1], float(lowest[-1]), 1 / (2 * freedom), correlation, confidence)
+        if self.model is None:
+            found = replace(found, note=f"{found.note}; taken as independent".removeprefix("; "))
+        return found
 
 
-def _add_moments(
-    readings: list[dict[str, Reading]], sums: Units, inside: Units | None, options: MetricsOptions
-) -> Resampled:
-    """Mean and 1σ, into readings; inside : units of the series without the means of their poses, for 1σ."""
-    drawn = resample(sums, options.bootstrap, options.seed)
-    for column, row in enumerate(readings):
-        row.update(moments(sums, column, options.bootstrap, options.seed, options.confidence))
-    if inside is not None:
-        for column, row in enumerate(readings):
-            sigma = moments(inside, column, options.bootstrap, options.seed, options.confidence)["sigma"]
-            row["sigma"] = replace(sigma, note=f"{POSE_NOTE}; {sigma.note}")
-        drawn = replace(drawn, sigma=resample(inside, options.bootstrap, options.seed, drawn.block).sigma)
-    return drawn
+def _cross(shared: RestRecording, measured: Sequence[Measured]) -> CrossAllan | None:
+    """Allan covariances of the 1 s means of all series; None where no stretch has three of them."""
+    stretches = shared.seconds.stretch
+    if np.bincount(stretches).max(initial=0) < 3:
+        return None
+    means = np.column_stack([one.seconds for one in measured])
+    return cross_allan(means, shared.seconds.rate_hz, shared.seconds, confidence=shared.options.confidence)
 
 
-def without_means(values: np.ndarray, segment: np.ndarray) -> np.ndarray:
-    """values [T] with the mean of each stretch taken off."""
-    return np.concatenate([piece - piece.mean() for piece in split_segments(values, segment)])
+def _draw(model: DriftModel, shared: RestRecording, measured: Sequence[Measured], felt: float) -> Drawn:
+    stretches = len(np.unique(shared.sampling.stretch)) if shared.poses else 1
+    seconds = len(shared.sampling) / shared.sampling.rate_hz / stretches
+    unit_s = shared.grid.unit_s
+    shortest = unit_s * max(math.ceil(felt / unit_s), 1)
+    longest_tau = min(float(one.curve.tau[-1]) for one in measured)
+    options = shared.options
+    return draw(model, stretches, seconds, longest_tau, shortest, options.bootstrap, options.seed)
 
 
-def _factors(
-    readings: list[dict[str, Reading]],
-    curves: list[AllanCurve],
-    drawn: Resampled,
-    singles: int,
-    column: int,
-    confidence: float,
-) -> dict[str, Reading]:
-    factors = {}
-    for name, replicates in (("mean", drawn.mean), ("sigma", drawn.sigma), ("arw_1s", drawn.adev_1s)):
-        figures = np.array([row[name].value for row in readings[:singles]])
-        factors[f"if_{name}"] = improvement_factor(
-            figures,
-            readings[column][name].value,
-            replicates[:, :singles],
-            replicates[:, column],
-            confidence,
-            name != "mean",
-        )
-    if "band-limited" in readings[column]["arw_1s"].note:
-        limited = factors["if_arw_1s"]
-        note = f"{limited.note}; the low-pass takes part in it".removeprefix("; ")
-        factors["if_arw_1s"] = replace(limited, note=note)
-    drift = [row["bias_drift"].value for row in readings]
-    freedom = np.array([_freedom(curve) for curve in curves])
-    factors["if_bias_drift"] = improvement_of_deviation(
-        np.array(drift[:singles]), drift[column], freedom[:singles], float(freedom[column]), confidence
-    )
-    return factors
-
-
-def _freedom(curve: AllanCurve) -> float:
-    lowest = np.where(curve.edf >= 1, curve.deviation, math.inf)
-    return float(curve.edf[int(np.argmin(lowest))])
+def _add_equal(readings: list[dict[str, Reading]], shared: RestRecording, array: _Array, confidence: float) -> None:
+    if shared.equaliser is None:
+        return
+    band = f"low-passed to {shared.equaliser.bandwidth_hz:.3g} Hz"
+    if array.equal is None:
+        nothing = Reading(math.nan, math.nan, math.nan, f"{band}: no stretch without a gap is long enough")
+        for row in readings:
+            row["sigma_equal"] = nothing
+        return
+    for row, found in zip(readings, array.equal.readings(confidence), strict=True):
+        row["sigma_equal"] = replace(found["sigma"], note=f"{band}; {found['sigma'].note}")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vgyro.config import MetricsOptions
-from vgyro.metrics import FIGURES, LowPass, Reading, make_units, resample, static_figures
+from vgyro.metrics import FIGURES, LowPass, Reading, Sampling, make_units, resample, static_figures
 
 Name = tuple[str, str]
 Rows = list[dict[str, Any]]
@@ -41,7 +41,8 @@ def series_figures(
              the first `gyros` of them are the single gyros
     values : [M, S] deg/s at rate_hz;  stretch : [M] number of the run without a gap
     """
-    found = static_figures(values.T, rate_hz, stretch, gyros, [LowPass()] * len(names), options, engine)
+    sampling = Sampling.of(rate_hz, stretch)
+    found = static_figures(values.T, sampling, gyros, [LowPass()] * len(names), options, engine)
     metrics = [
         _row(place, name, metric, metric, readings[metric])
         for name, readings in zip(names, found.readings, strict=True)

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from vgyro.board import Board
-from vgyro.config import CrossCheckOptions, FusionOptions
+from vgyro.config import CrossCheckOptions, FusionOptions, MetricsOptions
 from vgyro.engine.independent import printed_filter, textbook_allan_deviation
 from vgyro.fusion import FilterParameters
 from vgyro.fusion.design import information, q_for_bandwidth
+from vgyro.metrics import Sampling, allan_deviation, without_outliers
 from vgyro.storage.tables import read_columns, read_metadata, read_rows, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.crosscheck_rows import Row, columns_of, compare
@@ -23,6 +24,7 @@ FILTER_SAMPLES = 2000
 FILTER_TOLERANCE = 1e-9  # of the largest rate
 ALLAN_SERIES, ALLAN_TAUS = 3, 3
 ALLAN_TOLERANCE = 1e-7  # of the deviation
+DEFINITION, LOSSES = "definition: adjacent means", "the other engine, over short losses"
 
 
 def main(task: Task) -> None:
@@ -68,24 +70,41 @@ def _first_samples(task: Task, gyros: list[str]) -> np.ndarray:
 
 
 def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterator[Row]:
-    """Some points of the Allan curves of a few series, by the definition."""
-    curves = read_columns(task.input("allan"), ["series", "tau", "deviation"])
+    """Some points of the overlapping Allan curves of a few series, by the definition.
+
+    The definition knows of no lost sample: series with losses or outliers are computed again by the other engine.
+    """
+    curves = read_columns(task.input("allan"), ["series", "kind", "tau", "deviation"])
     names = sorted(set(curves["series"]))
-    if not names:
-        return
     file = read_array(task.input("rates"), [], task.options["axis"])
-    rest, segment = file.at_rest, file.rest_segment()
+    # A recording in motion at a constant rate has a curve of rate - reference, which is not looked at here.
+    if not names or not file.at_rest.any():
+        return
+    options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
+    sampling = file.rest_sampling(options.most_lost_s)
+    rest, segment = file.at_rest, sampling.segment
     for name in rng.permutation(names)[:ALLAN_SERIES]:
         rate = read_column(task.input("rates" if name in gyros else "fused"), str(name))
         rate = rate if rest.all() else rate[rest]
-        places = np.flatnonzero(curves["series"] == name)
+        outliers = without_outliers(rate, file.rate_hz, segment, options.outlier_threshold)[1]
+        whole = sampling.missing == 0 and not outliers.any()
+        places = np.flatnonzero((curves["series"] == name) & (curves["kind"] == "overlapping"))
         for place in np.sort(rng.permutation(places)[:ALLAN_TAUS]):
             tau, ours = float(curves["tau"][place]), float(curves["deviation"][place])
-            theirs = textbook_allan_deviation(rate, file.rate_hz, tau, segment)
+            if whole:
+                theirs = textbook_allan_deviation(rate, file.rate_hz, tau, segment)
+            else:
+                theirs = _by_other_engine(task, rate[~outliers], sampling.without(outliers), tau)
             yield compare(
-                f"Allan deviation, τ = {tau:.4g} s", "definition: adjacent means", -1, str(name), ours, theirs,
+                f"Allan deviation, τ = {tau:.4g} s", DEFINITION if whole else LOSSES, -1, str(name), ours, theirs,
                 ALLAN_TOLERANCE * abs(ours), "deg/s",
             )  # fmt: skip
+
+
+def _by_other_engine(task: Task, rate: np.ndarray, sampling: Sampling, tau: float) -> float:
+    other = "reference" if task.options["analysis"].get("engine", "native") == "native" else "native"
+    curve = allan_deviation(rate, sampling.rate_hz, np.array([tau]), engine=other, sampling=sampling)
+    return float(curve.deviation[0])
 
 
 if __name__ == "__main__":

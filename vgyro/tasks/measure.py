@@ -1,86 +1,86 @@
-"""Measure: Allan deviations, densities, correlation and every figure of one array, with intervals."""
+"""Measure: Allan deviations, densities, correlation, tones and every figure of one array, with intervals."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 
 from vgyro.board import Board
 from vgyro.config import MetricsOptions
 from vgyro.metrics import (
-    FIGURES,
-    AllanCurve,
     Correlation,
     LowPass,
-    Reading,
-    Spectrum,
+    Measured,
+    RestRecording,
+    StaticFigures,
+    array_figures,
+    common_bandwidth,
     correlation_matrix,
+    counted,
     dynamic_figures,
-    static_figures,
-    stretches,
-    thinned,
+    without_outliers,
 )
-from vgyro.storage.tables import Provenance, read_columns, write_table
+from vgyro.storage.tables import read_columns, read_metadata
 from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.measure_tables import Results, Rows, Series, write_results
 from vgyro.tasks.rates_file import ArrayFile, FileColumns, read_array
 
-SPECTRUM_POINTS = 600
 FEWEST_SAMPLES = 3  # in the longest stretch, for an Allan deviation
+HEAD = ("time", "segment")
 
 
 @dataclass(frozen=True)
-class Series:
-    """One column to measure: its file and name there, what metrics.parquet calls it, and what it went through."""
+class Still:
+    """Static figures of the series of a recording, and what they were made from.
 
-    path: Path
-    column: str
-    method: str
-    definition: str
-    low_pass: LowPass
+    true_rate : deg/s, 0 at rest;  where : [T] samples that were taken, None: all
+    """
+
+    true_rate: float
+    where: np.ndarray | None
+    shared: RestRecording
+    measured: list[Measured]
+    figures: StaticFigures
 
 
 def main(task: Task) -> None:
-    """inputs : rates, fused, methods;  outputs : allan, spectrum, metrics, correlation
+    """inputs : rates, fused, methods, moved;  outputs : allan, spectrum, metrics, correlation, cross_allan, tones
 
     options : board, axis, recording, kind, analysis.metrics, analysis.engine
     """
     options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
-    engine = task.options["analysis"].get("engine", "native")
     axis, rates = task.options["axis"], task.input("rates")
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(axis)]
     series = [Series(rates, gyro, gyro, "", LowPass()) for gyro in gyros]
     series += fused_series(task.input("fused"), read_columns(task.input("methods")))
-    places = [(one.path, one.column) for one in series]
     frame = read_array(rates, [], axis)
-    curves: dict[str, AllanCurve] = {}
-    spectra: dict[str, Spectrum] = {}
-    readings: list[dict[str, Reading]] = [{} for _ in series]
-    resting = frame.at_rest.any()
-    rest = frame.rest_segment()
-    poses = stretches(rest)
-    if max((stop - start for start, stop in poses), default=0) >= FEWEST_SAMPLES:
-        found = static_figures(
-            FileColumns(places, frame.at_rest), frame.rate_hz, rest, len(gyros), [one.low_pass for one in series],
-            options, engine, task.options["kind"] == "free" and len(poses) > 1,
-        )  # fmt: skip
-        names = [one.column for one in series]
-        curves, spectra = dict(zip(names, found.curves, strict=True)), dict(zip(names, found.spectra, strict=True))
-        readings = found.readings
     reference = frame.reference
+    still = still_figures(task, frame, reference, series, len(gyros), options)
+    rows = [] if still is None else [Rows(series, still.figures.readings, still.true_rate)]
     if reference is not None:
-        moving = dynamic_figures(FileColumns(places), reference, frame.rate_hz, frame.segment, len(gyros), options)
-        readings = [{**still, **row} for still, row in zip(readings, moving, strict=True)]
-    made = task.provenance()
-    write_tables(task, made, series, curves, spectra, readings)
-    correlation = noise_correlation(places[: len(gyros)], frame, rest, reference, options)
-    write_table(
-        task.output("correlation"), correlation_columns(gyros, correlation), "correlation", made,
-        {"of": "samples at rest" if resting else "rate - reference"},
-    )  # fmt: skip
+        columns, sampling = columns_of(series), frame.sampling(options.most_lost_s)
+        moving = dynamic_figures(
+            columns, reference, frame.rate_hz, frame.segment, len(gyros), options, sampling=sampling
+        )
+        rows = with_dynamic(rows, Rows(series, moving, 0.0))
+    if still is not None and still.true_rate == 0:
+        rows += moved_figures(task.input("moved"), series, len(gyros), still)
+    correlation = noise_correlation(columns_of(series[: len(gyros)]), frame, reference, options)
+    of = "samples at rest" if frame.at_rest.any() else "rate - reference"
+    figures = None if still is None else still.figures
+    write_results(task, Results(series, len(gyros), rows, figures, correlation, of, frame.rate_hz), options.confidence)
+
+
+def columns_of(
+    series: Sequence[Series], where: np.ndarray | None = None, less: float | np.ndarray = 0.0
+) -> FileColumns:
+    """Their rates, each read when it is asked for."""
+    return FileColumns([(one.path, one.column) for one in series], where, less)
 
 
 def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]:
@@ -97,81 +97,79 @@ def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]
     return found
 
 
-def noise_correlation(
-    gyros: list[tuple[Path, str]],
+def still_figures(
+    task: Task,
     frame: ArrayFile,
-    rest: np.ndarray,
     reference: np.ndarray | None,
+    series: list[Series],
+    singles: int,
     options: MetricsOptions,
+) -> Still | None:
+    """Figures of the samples at rest; of a recording at a constant, known rate: those of rate - reference."""
+    where, less, true_rate = frame.at_rest, 0.0, 0.0
+    if task.options["kind"] == "constant" and reference is not None and not where.any():
+        where = np.isfinite(reference)
+        less = reference[where]
+        true_rate = float(np.mean(less)) if where.any() else 0.0
+    sampling = frame.sampling(options.most_lost_s)
+    if not where.all():
+        sampling = sampling.without(~where)
+    longest = np.bincount(sampling.stretch).max(initial=0)
+    if longest < FEWEST_SAMPLES:
+        return None
+    poses = task.options["kind"] == "free" and bool(sampling.stretch[-1] > 0)
+    bandwidth_hz = common_bandwidth([one.low_pass for one in series], options.equal_bandwidth_hz)
+    engine = task.options["analysis"].get("engine", "native")
+    shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses)
+    columns = columns_of(series, where, less)
+    measured = [shared.measure(values, one.low_pass) for values, one in zip(columns, series, strict=True)]
+    figures = array_figures(shared, measured, singles)
+    clipped = read_metadata(frame.path).get("clipped", {})
+    for one, row in zip(series[:singles], figures.readings, strict=False):
+        if one.column in clipped:
+            row["clipped"] = counted(int(clipped[one.column]))
+    return Still(true_rate, where, shared, measured, figures)
+
+
+def with_dynamic(still: list[Rows], moving: Rows) -> list[Rows]:
+    """Dynamic figures beside static ones; those of the same true rate go into the same rows."""
+    if still and still[0].true_rate == moving.true_rate:
+        readings = [{**rest, **row} for rest, row in zip(still[0].readings, moving.readings, strict=True)]
+        return [replace(moving, readings=readings)]
+    return [*still, moving]
+
+
+def moved_figures(path: Path, series: list[Series], singles: int, still: Still) -> list[Rows]:
+    """Static figures of the methods that a constant rate changes; the errors of the gyros are the same with it."""
+    rate = read_metadata(path).get("injected_rate")
+    names = [name for name in pq.read_schema(path).names if name not in HEAD]
+    if rate is None or not names:
+        return []
+    moved = [replace(one, path=path) for one in series[singles:] if one.column in names]
+    columns = columns_of(moved, still.where)
+    own = [still.shared.measure(values, one.low_pass) for values, one in zip(columns, moved, strict=True)]
+    found = array_figures(still.shared, [*still.measured[:singles], *own], singles)
+    return [Rows(moved, found.readings[singles:], float(rate))]
+
+
+def noise_correlation(
+    gyros: FileColumns, frame: ArrayFile, reference: np.ndarray | None, options: MetricsOptions
 ) -> Correlation:
     """Correlation of the noise at rest; of the errors where the board moves and the true rate is known; else NaN."""
+    rest = frame.rest_segment()
     if rest.size:
-        return correlation_matrix(FileColumns(gyros, frame.at_rest), frame.rate_hz, rest, options.confidence)
+
+        def cleaned(rate: np.ndarray) -> np.ndarray:
+            return without_outliers(rate, frame.rate_hz, rest, options.outlier_threshold)[0]
+
+        columns = replace(gyros, where=frame.at_rest, cleaned=cleaned)
+        return correlation_matrix(columns, frame.rate_hz, rest, options.confidence)
     if reference is not None and np.isfinite(reference).sum() > len(gyros):
         known = np.isfinite(reference)
-        moving, segment = FileColumns(gyros, known), frame.segment[known]
-        return correlation_matrix(moving, frame.rate_hz, segment, options.confidence, reference[known])
+        moving = replace(gyros, where=known)
+        return correlation_matrix(moving, frame.rate_hz, frame.segment[known], options.confidence, reference[known])
     unknown = np.full((len(gyros), len(gyros)), math.nan)
     return Correlation(unknown, unknown, unknown, unknown)
-
-
-def write_tables(
-    task: Task,
-    made: Provenance,
-    series: list[Series],
-    curves: dict[str, AllanCurve],
-    spectra: dict[str, Spectrum],
-    readings: list[dict[str, Reading]],
-) -> None:
-    """Write allan, spectrum and metrics; without a curve the tables have no rows."""
-    allan = {
-        name: [getattr(curve, name) for curve in curves.values()] for name in ("tau", "deviation", "low", "high", "edf")
-    }
-    columns = {"series": _repeated({name: len(curve.tau) for name, curve in curves.items()})}
-    columns |= {name: np.concatenate([np.empty(0), *parts]) for name, parts in allan.items()}
-    write_table(task.output("allan"), columns, "allan", made)
-    thin = {name: thinned(spectrum, SPECTRUM_POINTS) for name, spectrum in spectra.items()}
-    columns = {"series": _repeated({name: len(spectrum.frequency) for name, spectrum in thin.items()})}
-    columns["frequency"] = np.concatenate([np.empty(0), *(spectrum.frequency for spectrum in thin.values())])
-    columns["density"] = np.concatenate([np.empty(0), *(spectrum.density for spectrum in thin.values())])
-    write_table(task.output("spectrum"), columns, "spectrum", made)
-    write_table(task.output("metrics"), metric_columns(task, series, readings), "metrics", made)
-
-
-def metric_columns(task: Task, series: list[Series], readings: list[dict[str, Reading]]) -> dict[str, np.ndarray]:
-    """metrics.parquet, long: one row a series and figure, in the order of FIGURES."""
-    rows = [
-        (
-            task.options["recording"], task.options["axis"], one.method, one.definition, name,
-            row[name].value, row[name].low, row[name].high, figure.unit, row[name].note,
-        )
-        for one, row in zip(series, readings, strict=True)
-        for name, figure in FIGURES.items()
-        if name in row
-    ]  # fmt: skip
-    names = ("recording", "axis", "method", "definition", "metric", "value", "low", "high", "unit", "note")
-    columns = {name: [row[index] for row in rows] for index, name in enumerate(names)}
-    return {name: _typed(name, column) for name, column in columns.items()}
-
-
-def correlation_columns(gyros: list[str], correlation: Correlation) -> dict[str, list]:
-    """correlation.parquet: one row a pair, both ways, and the diagonal."""
-    places = [(row, column) for row in range(len(gyros)) for column in range(len(gyros))]
-    return {
-        "gyro": [gyros[row] for row, _ in places],
-        "other": [gyros[column] for _, column in places],
-        "correlation": [float(correlation.value[place]) for place in places],
-        "low": [float(correlation.low[place]) for place in places],
-        "high": [float(correlation.high[place]) for place in places],
-    }
-
-
-def _repeated(lengths: Mapping[str, int]) -> np.ndarray:
-    return np.array([name for name, length in lengths.items() for _ in range(length)], dtype=str)
-
-
-def _typed(name: str, column: list) -> np.ndarray:
-    return np.array(column, dtype=float) if name in {"value", "low", "high"} else np.array(column, dtype=str)
 
 
 if __name__ == "__main__":

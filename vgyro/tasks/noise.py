@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from vgyro.metrics import (
     noise_from_differences,
     read_curve,
     stretches,
+    without_outliers,
 )
 from vgyro.storage.tables import write_json
 from vgyro.tasks.common import Task, run_task
@@ -53,7 +55,7 @@ def main(task: Task) -> None:
     frame = read_array(path, [], task.options["axis"])
     places = [(path, gyro) for gyro in gyros]
     if rests_enough(frame):
-        found = noise_at_rest(FileColumns(places, frame.at_rest), frame, options, engine)
+        found = noise_at_rest(places, frame, options, engine)
     else:
         found = noise_in_motion(FileColumns(places), frame, engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
@@ -66,19 +68,27 @@ def rests_enough(array: ArrayFile) -> bool:
 
 
 def noise_at_rest(
-    series: Sequence[np.ndarray], frame: ArrayFile, options: MetricsOptions, engine: str
+    places: list[tuple[Path, str]], frame: ArrayFile, options: MetricsOptions, engine: str
 ) -> ArrayNoiseRecord:
-    """From the samples at rest, the only ones of `series`; no difference is taken across their gaps."""
-    segment = frame.rest_segment()
+    """From the samples at rest of the gyros at `places`, without outliers; averages go over short losses alone."""
+    sampling = frame.rest_sampling(options.most_lost_s)
+    segment, rate_hz = sampling.segment, frame.rate_hz
     fits, read = [], []
-    for rate in series:
+    for rate in FileColumns(places, frame.at_rest):
+        outliers = without_outliers(rate, rate_hz, segment, options.outlier_threshold)[1]
         curve = allan_deviation(
-            rate, frame.rate_hz, None, segment, options.confidence, engine, per_octave=options.taus_per_octave
-        )
+            rate[~outliers], rate_hz, None, None, options.confidence, engine, options.taus_per_octave,
+            sampling=sampling.without(outliers),
+        )  # fmt: skip
         fits.append(noise_coefficients(curve, replicates=options.bootstrap, seed=options.seed))
         read.append(read_curve(curve, 1.0)[0])
-    correlation = correlation_matrix(series, frame.rate_hz, segment, options.confidence).value
-    return ArrayNoiseRecord("samples at rest", len(segment) / frame.rate_hz, fits, read, correlation)
+
+    def cleaned(rate: np.ndarray) -> np.ndarray:
+        return without_outliers(rate, rate_hz, segment, options.outlier_threshold)[0]
+
+    columns = FileColumns(places, frame.at_rest, cleaned=cleaned)
+    correlation = correlation_matrix(columns, rate_hz, frame.rest_segment(), options.confidence).value
+    return ArrayNoiseRecord("samples at rest", len(segment) / rate_hz, fits, read, correlation)
 
 
 def noise_in_motion(series: Sequence[np.ndarray], frame: ArrayFile, engine: str) -> ArrayNoiseRecord:

@@ -75,7 +75,8 @@ def _records(path: Path, **place: str) -> Rows:
 
 
 def _metrics(path: Path, _gyros: Sequence[str]) -> Rows:
-    return _records(path)
+    """The figures of the recording as it is; those at another rate are not the papers'."""
+    return [row for row in _records(path) if row["true_rate"] == 0]
 
 
 def _correlation(path: Path, _gyros: Sequence[str]) -> Rows:

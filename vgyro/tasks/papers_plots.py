@@ -45,7 +45,7 @@ def _allan(path: Path, gyros: Sequence[str], labels: dict[str, str]) -> Markup:
     curves = []
     # The virtual gyroscopes are drawn last, over the single ones.
     for index, name in enumerate([*gyros, *methods]):
-        rows = table["series"] == name
+        rows = (table["series"] == name) & (table["kind"] == "overlapping")
         tau, y, low, high = (table[column][rows] for column in ("tau", "deviation", "low", "high"))
         virtual = name in labels
         curves.append(

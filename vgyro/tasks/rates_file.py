@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import overload
 
@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from vgyro.errors import DataError
+from vgyro.metrics import Sampling
 from vgyro.storage.tables import read_batches, read_metadata
 
 
@@ -41,6 +42,23 @@ class ArrayFile:
         known = "reference" in pq.read_schema(self.path).names
         about_axis = known and read_metadata(self.path).get("reference_axis", self.axis) == self.axis
         return read_column(self.path, "reference") if about_axis else None
+
+    def sampling(self, most_lost_s: float) -> Sampling:
+        """When all samples were taken; losses up to most_lost_s, s, do not end a stretch. Reads the times."""
+        border = np.flatnonzero(self.segment[1:] != self.segment[:-1]) + 1
+        time = self.time
+        steps = np.rint((time[border] - time[border - 1]) * self.rate_hz).astype(np.int64)
+        del time
+        # Within a segment every sample is there; between two some are lost, or the board began anew.
+        lost = np.cumsum(np.maximum(steps, 1) - 1)
+        position = np.arange(len(self.segment))
+        position += np.repeat(np.append(0, lost), np.diff(np.concatenate([[0], border, [len(position)]])))
+        return Sampling.of(self.rate_hz, self.segment, position, most_lost_s)
+
+    def rest_sampling(self, most_lost_s: float) -> Sampling:
+        """When the samples at rest were taken; what moves, or was clipped, counts as lost."""
+        sampling = self.sampling(most_lost_s)
+        return sampling if self.at_rest.all() else sampling.without(~self.at_rest)
 
     def rest_segment(self) -> np.ndarray:
         """Number [R] of the stretch, at rest and without a gap, of each sample at rest."""
@@ -85,11 +103,14 @@ def read_column(path: Path, name: str) -> np.ndarray:
 class FileColumns(Sequence[np.ndarray]):
     """Columns of numbers of tables, each read when it is asked for.
 
-    places : file and name of each;  where : [T] samples to take, None: all
+    places  : file and name of each;  where : [T] samples to take, None: all
+    less    : taken off, a number or an array [those samples];  cleaned : what is done to each then, None: nothing
     """
 
     places: Sequence[tuple[Path, str]]
     where: np.ndarray | None = None
+    less: float | np.ndarray = 0.0
+    cleaned: Callable[[np.ndarray], np.ndarray] | None = None
 
     def __len__(self) -> int:
         return len(self.places)
@@ -100,6 +121,10 @@ class FileColumns(Sequence[np.ndarray]):
     def __getitem__(self, index: slice) -> FileColumns: ...
     def __getitem__(self, index: int | slice) -> np.ndarray | FileColumns:
         if isinstance(index, slice):
-            return FileColumns(self.places[index], self.where)
+            return replace(self, places=self.places[index])
         values = read_column(*self.places[index])
-        return values if self.where is None or self.where.all() else values[self.where]
+        if self.where is not None and not self.where.all():
+            values = values[self.where]
+        if np.any(self.less):
+            values -= self.less
+        return values if self.cleaned is None else self.cleaned(values)

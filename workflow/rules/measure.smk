@@ -1,14 +1,17 @@
 rule measure:
-    """Allan deviations, densities, correlation and every figure, with intervals."""
+    """Allan deviations, densities, correlation, tones and every figure, with intervals."""
     input:
         rates="results/{dataset}/{recording}/rates.parquet",
         fused="results/{dataset}/{recording}/{axis}/fused.parquet",
         methods="results/{dataset}/{recording}/{axis}/methods.parquet",
+        moved="results/{dataset}/{recording}/{axis}/moved.parquet",
     output:
         allan="results/{dataset}/{recording}/{axis}/allan.parquet",
         spectrum="results/{dataset}/{recording}/{axis}/spectrum.parquet",
         metrics="results/{dataset}/{recording}/{axis}/metrics.parquet",
         correlation="results/{dataset}/{recording}/{axis}/correlation.parquet",
+        cross_allan="results/{dataset}/{recording}/{axis}/cross_allan.parquet",
+        tones="results/{dataset}/{recording}/{axis}/tones.parquet",
     log:
         "results/logs/{dataset}/{recording}/{axis}/measure.log",
     benchmark:
@@ -20,8 +23,8 @@ rule measure:
         options=stage("board", "engine", "metrics"),
         code=code("measure"),
     shell:
-        "python -m vgyro.tasks.measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods}"
-        " --output allan {output.allan} --output spectrum {output.spectrum} --output metrics {output.metrics} --output correlation {output.correlation}"
+        "python -m vgyro.tasks.measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods} --input moved {input.moved}"
+        " --output allan {output.allan} --output spectrum {output.spectrum} --output metrics {output.metrics} --output correlation {output.correlation} --output cross_allan {output.cross_allan} --output tones {output.tones}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
 

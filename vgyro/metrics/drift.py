@@ -1,0 +1,213 @@
+"""Noise of several series together, fitted to their Allan covariances, and drawn again: what blocks cannot resample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.metrics.cross_allan import CrossAllan
+
+MOST_BLOCKS = 1024
+FEWEST_TAUS = 4
+EVIDENCE = 0.05
+FLICKER = 2 * math.log(2) / math.pi
+PASSES, SWEEPS = 3, 60
+BATCH = 1 << 19  # numbers that are drawn together
+SMALL = 1e-9
+PER_OCTAVE = 3
+
+
+@dataclass(frozen=True)
+class DriftModel:
+    """Covariances [S, S] of white noise (deg/s)²/Hz, flicker (deg/s)² and random walk (deg/s)²/s of S series."""
+
+    white: np.ndarray
+    flicker: np.ndarray
+    walk: np.ndarray
+
+    def deviation(self, tau: np.ndarray) -> np.ndarray:
+        """Allan deviations [M, S] at tau [M], deg/s."""
+        terms = np.stack([np.diag(matrix) for matrix in (self.white, self.flicker, self.walk)])
+        return np.sqrt(_basis(tau) @ terms)
+
+    def correlation(self, tau: float) -> np.ndarray:
+        """Correlation [S, S] of the Allan variations at tau, s; 0: of the white noise."""
+        white, flicker, walk = _basis(np.array([tau]))[0] if tau > 0 else (1.0, 0.0, 0.0)
+        covariance = white * self.white + flicker * self.flicker + walk * self.walk
+        scale = np.sqrt(np.diag(covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found = np.where(np.outer(scale, scale) > 0, covariance / np.outer(scale, scale), 0.0)
+        return np.clip(found, -1, 1)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """R replicates of S series over the whole recording, in deg/s; the models' own figures beside them.
+
+    mean     [R, S] : mean about the bias that the series began with
+    variance [R, S] : of the means of blocks of block_s about their mean;  expected [S] : its mean over the replicates
+    lowest   [R, S] : minimum of the Allan deviation from τ = block_s on;  lowest_expected [S] : that of the model
+    """
+
+    mean: np.ndarray
+    variance: np.ndarray
+    lowest: np.ndarray
+    lowest_expected: np.ndarray
+    block_s: float
+
+    @property
+    def expected(self) -> np.ndarray:
+        """Mean [S] of the variances."""
+        return self.variance.mean(axis=0)
+
+    def scaled(self, factor: np.ndarray) -> Drawn:
+        """The draws of series that are so many times as large [S]."""
+        return Drawn(
+            self.mean * factor, self.variance * factor**2, self.lowest * factor, self.lowest_expected * factor,
+            self.block_s,
+        )  # fmt: skip
+
+
+def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftModel | None:
+    """White noise, flicker and random walk with their covariances, from Allan covariances of S series, deg/s.
+
+    singles  : the first so many series are gyros, which decide whether there is a drift
+    shortest : τ below are left out, s (a low-pass is felt there)
+    returns  : None where there are too few τ; without flicker and walk where the gyros do not show a drift: a term that
+               may not be negative would be found in white noise, too
+    Least squares of C(τ) = W/τ + (2 ln2/π)F + Kτ/3 with weights edf/σ⁴, each matrix positive semidefinite: one is
+    fitted at a time and cut at zero, until it settles.
+    """
+    freedom = np.diagonal(found.edf, axis1=1, axis2=2)[:, :singles].mean(axis=1)
+    used = (found.tau >= shortest * (1 - SMALL)) & (freedom >= 1)
+    tau, covariance, edf = found.tau[used], found.covariance[used], freedom[used]
+    if len(tau) < FEWEST_TAUS or not np.all(np.diagonal(covariance[0]) > 0):
+        return None
+    terms = 3 if _drifts(tau, covariance[:, :singles, :singles], edf) else 1
+    return _fit(tau, covariance, edf, terms)
+
+
+def _drifts(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray) -> bool:
+    """Is the Allan covariance [M, N, N] above that of white noise at any τ?
+
+    C(τ₀)⁻¹·C(τ)·τ/τ₀ has the mean trace N of white noise, as chi² with N·edf degrees of freedom; τ₀ is the shortest τ.
+    """
+    from scipy.special import chdtrc
+
+    trace = np.trace(np.linalg.pinv(covariance[0], hermitian=True) @ covariance, axis1=1, axis2=2) * tau / tau[0]
+    rank = np.linalg.matrix_rank(covariance[0], hermitian=True)
+    p_value = chdtrc(rank * edf[1:], trace[1:] * edf[1:])
+    octaves = max(math.log2(tau[-1] / tau[0]), 1.0)
+    return bool(p_value.min() < EVIDENCE / octaves)
+
+
+def draw(
+    model: DriftModel, stretches: int, seconds: float, longest_tau: float, unit_s: float, replicates: int, seed: int
+) -> Drawn:
+    """Draw the series of a model again and again.
+
+    stretches   : how many, each `seconds` long; noise of one does not go on in the next
+    longest_tau : up to which the Allan deviation is looked at, s;  unit_s : shortest block, s
+    """
+    block_s = unit_s * max(math.ceil(stretches * seconds / unit_s / MOST_BLOCKS), 1)
+    blocks = max(int(seconds / block_s), 1)
+    last = min(blocks // 3, int(longest_tau / block_s + SMALL))
+    octaves = np.arange(0, PER_OCTAVE * math.log2(max(last, 1)) + SMALL)
+    factors = np.unique(np.round(2.0 ** (octaves / PER_OCTAVE)).astype(int))
+    mean, variance, lowest = [], [], []
+    for series in _series(model, stretches, blocks, block_s, replicates, seed):
+        each = series.mean(axis=-1, keepdims=True)
+        mean.append(each[..., 0].mean(axis=-1))
+        variance.append(np.var(series, axis=-1).mean(axis=-1) if stretches > 1 else np.var(series[:, :, 0], axis=-1))
+        lowest.append(_lowest(series, factors) if last >= 1 else np.full(each.shape[:2], math.nan))
+    expected = model.deviation(factors * block_s).min(axis=0)
+    return Drawn(np.concatenate(mean), np.concatenate(variance), np.concatenate(lowest), expected, block_s)
+
+
+def _basis(tau: np.ndarray) -> np.ndarray:
+    return np.column_stack([1 / tau, np.full(len(tau), FLICKER), tau / 3])
+
+
+def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int) -> DriftModel:
+    """number : of the terms that are fitted, in the order white, flicker, walk"""
+    scale = np.sqrt(np.diagonal(covariance[0]) * tau[0])
+    scale = np.where(scale > 0, scale, 1.0)
+    size = np.outer(scale, scale)
+    target = covariance / size
+    basis = _basis(tau)
+    terms = np.zeros((3, *size.shape))
+    level = np.trace(target, axis1=1, axis2=2)
+    for _ in range(PASSES):
+        weights = edf / np.maximum(level, SMALL * level.max()) ** 2
+        left = np.tensordot((weights[:, None] * basis).T, target, axes=1)
+        gram = (weights[:, None] * basis).T @ basis
+        for _ in range(SWEEPS):
+            for term in range(number):
+                others = left[term] - sum(gram[term, other] * terms[other] for other in range(number) if other != term)
+                terms[term] = _positive(others / gram[term, term])
+        level = basis @ np.trace(terms, axis1=1, axis2=2)
+    return DriftModel(*(terms * size))
+
+
+def _positive(matrix: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eigh(matrix)
+    return (vectors * np.maximum(values, 0)) @ vectors.T
+
+
+def _root(matrix: np.ndarray) -> np.ndarray:
+    """[S, r] with root·root' = matrix, r its rank."""
+    values, vectors = np.linalg.eigh(matrix)
+    there = values > SMALL * max(values[-1], 0)
+    return vectors[:, there] * np.sqrt(values[there])
+
+
+def _series(
+    model: DriftModel, stretches: int, blocks: int, block_s: float, replicates: int, seed: int
+) -> Iterator[np.ndarray]:
+    """Block means [r, S, stretches, blocks] of replicates, some at a time."""
+    generator = np.random.default_rng(seed)
+    white, flicker, walk = (_root(matrix) for matrix in (model.white, model.flicker, model.walk))
+    number = len(model.white)
+    some = max(BATCH // (number * stretches * blocks), 1)
+    for first in range(0, replicates, some):
+        count = min(some, replicates - first)
+
+        def normal(rank: int, count: int = count) -> np.ndarray:
+            return generator.standard_normal((count, rank, stretches * blocks))
+
+        series = white @ normal(white.shape[1]) / math.sqrt(block_s)
+        if walk.size:
+            steps = normal(walk.shape[1]).reshape(count, -1, stretches, blocks)
+            series += walk @ np.cumsum(steps, axis=-1).reshape(count, -1, stretches * blocks) * math.sqrt(block_s)
+        if flicker.size:
+            drawn = _unit_flicker(generator, (count, flicker.shape[1], stretches), blocks)
+            series += flicker @ drawn.reshape(count, -1, stretches * blocks)
+        yield series.reshape(count, number, stretches, blocks)
+
+
+def _unit_flicker(generator: np.random.Generator, shape: tuple[int, ...], blocks: int) -> np.ndarray:
+    """Flicker noise with B = 1, density 1/(2πf), by normal Fourier coefficients over twice the length."""
+    from scipy.fft import irfft, next_fast_len
+
+    length = next_fast_len(2 * blocks, real=True)
+    bins = np.maximum(np.arange(length // 2 + 1), 1)
+    spectrum = generator.standard_normal((*shape, 2 * len(bins))).view(complex)
+    spectrum *= length / np.sqrt(4 * np.pi * bins)
+    spectrum[..., 0] = 0
+    return irfft(spectrum, length, overwrite_x=True)[..., :blocks]
+
+
+def _lowest(series: np.ndarray, factors: np.ndarray) -> np.ndarray:
+    """Lowest Allan deviation [r, S] of block means [r, S, stretches, blocks] at averaging factors."""
+    angle = np.zeros((*series.shape[:-1], series.shape[-1] + 1))
+    np.cumsum(series, axis=-1, out=angle[..., 1:])
+    lowest = np.full(series.shape[:2], math.inf)
+    for factor in factors.tolist():
+        step = angle[..., factor:] - angle[..., :-factor]
+        difference = step[..., factor:] - step[..., :-factor]
+        mean = np.einsum("rsnt,rsnt->rs", difference, difference) / difference[0, 0].size
+        np.minimum(lowest, mean / (2 * factor**2), out=lowest)
+    return np.sqrt(lowest)
