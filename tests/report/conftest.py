@@ -379,10 +379,12 @@ def _write_noise_in_common(folder: Path, gyros: tuple[str, ...]) -> None:
 
 
 def _write_effects(folder: Path, gyros: tuple[str, ...]) -> None:
-    known = {"g1": "tone", "g2": "drift", "g3": "tone", "g4": "heteroskedastic + drift"}
+    known = {
+        "g1": "tone at 6.5 Hz", "g2": "drift + disturbance at t = 12 s", "g3": "tone at 6.5 Hz", "g4": "no variance",
+    }  # fmt: skip
     verdict = [known.get(gyro, "nothing") for gyro in gyros]
     empty = np.full(len(gyros), np.nan)
-    tone = np.where(np.isin(verdict, "tone"), 6.5, np.nan)
+    tone = np.where(np.isin(verdict, "tone at 6.5 Hz"), 6.5, np.nan)
     write_table(folder / "effects.parquet", {
         "gyro": gyros, "verdict": verdict, "sentence": [f"{word}: made up <here>" for word in verdict],
         "p_level": np.zeros(len(gyros)), "p_detrended": empty, "p_whitened": empty, "p_standardised": empty,

@@ -30,10 +30,12 @@ def html(dataset: DatasetPart) -> str:
 
 
 def cells(html: str, title: str) -> list[str]:
-    """Texts of the cells of one figure's row, markup taken out."""
-    row = re.search(rf">{re.escape(title)}</th>(.*?)</tr>", html, re.S)
+    """Unit and texts of the cells of one figure's row, markup taken out."""
+    row = re.search(rf'>{re.escape(title)}<span class="below">([^<]*)</span></th>(.*?)</tr>', html, re.S)
     assert row is not None, title
-    return [re.sub(r"<[^>]+>", " ", cell).strip() for cell in re.findall(r"<td[^>]*>(.*?)</td>", row.group(1), re.S)]
+    return [row.group(1)] + [
+        re.sub(r"<[^>]+>", " ", cell).strip() for cell in re.findall(r"<td[^>]*>(.*?)</td>", row.group(2), re.S)
+    ]
 
 
 def test_a_certificate_says_what_was_calibrated_and_how(html: str) -> None:

@@ -162,6 +162,7 @@ def test_limits_are_said(dataset: DatasetPart) -> None:
 def test_arch_verdicts_are_said_together(dataset: DatasetPart) -> None:
     texts = [one.text for one in conclude(dataset) if one.text.startswith("ARCH")]
     assert texts == [
-        "ARCH effects of the level (axis x, rest): tone: g1, g3; drift: g2; heteroskedastic + drift: g4.",
+        "ARCH effects of the level (axis x, rest): tone at 6.5 Hz: g1, g3; drift + disturbance: g2; "
+        "no verdict (no variance): g4.",
         "ARCH effects of the level (axis z, rest): nothing: solo.",
     ]

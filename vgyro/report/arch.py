@@ -7,20 +7,37 @@ from markupsafe import Markup
 from vgyro.report.model import ArrayPart, rows_of
 from vgyro.report.tables import Cell, Column, Tone, render_table
 
-NOTHING = "nothing"
-HETEROSKEDASTIC = "heteroskedastic"
-TONES: dict[str, Tone] = {HETEROSKEDASTIC: "bad", NOTHING: "good"}
-KNOWN = (HETEROSKEDASTIC, "drift", "tone", NOTHING)
+# First word of each part of a verdict → tone; any other first word says why there is none.
+TONES: dict[str, Tone] = {
+    "heteroskedastic": "bad",
+    "drift": "warn",
+    "tone": "warn",
+    "disturbance": "warn",
+    "disturbances": "warn",
+    "correlation": "warn",
+    "nothing": "good",
+}
+SHORT = {"disturbance": "disturbance", "disturbances": "disturbance"}
 ARCH_RULE = (
-    "An ARCH effect is called heteroskedastic only where the whitened series (tones taken out) still rejects at 5 %; "
-    "else it is called what explains it: drift, or a tone."
+    "An ARCH effect of the level is called heteroskedastic only where the series without drift, tones, correlation and "
+    "short disturbances still rejects; else it is called what makes the test reject. The levels of the tests are such "
+    "that white noise gets any verdict but “nothing” in less than 5 % of cases."
 )
 COLUMNS = (Column("gyro", numeric=False), Column("verdict", numeric=False), Column("why", numeric=False))
 
 
-def verdicts(array: ArrayPart) -> dict[str, str]:
-    """Gyro → verdict; empty where there was no test."""
-    return {str(row["gyro"]): str(row["verdict"]) for row in rows_of(array.tables.get("effects", {}))}
+def verdicts(array: ArrayPart) -> dict[str, list[str]]:
+    """Verdict → gyros, without the times of disturbances; empty where there was no test."""
+    found: dict[str, list[str]] = {}
+    for row in rows_of(array.tables.get("effects", {})):
+        parts = [SHORT.get(_first(part), part) for part in str(row["verdict"]).split(" + ")]
+        words = " + ".join(parts) if _first(parts[0]) in TONES else f"no verdict ({row['verdict']})"
+        found.setdefault(words, []).append(str(row["gyro"]))
+    return found
+
+
+def _first(part: str) -> str:
+    return part.split(" ", 1)[0]
 
 
 def effects_table(array: ArrayPart) -> Markup:
@@ -33,11 +50,5 @@ def effects_table(array: ArrayPart) -> Markup:
 
 
 def _verdict(verdict: str) -> Cell:
-    if not set(parts(verdict)) <= set(KNOWN):
-        return Cell("no verdict", tone="muted", hint=verdict)
-    return Cell(verdict, tone=TONES.get(parts(verdict)[0], "warn"))
-
-
-def parts(verdict: str) -> list[str]:
-    """The words of a verdict, which a + joins."""
-    return [word.strip() for word in verdict.split("+")]
+    tone = TONES.get(_first(verdict))
+    return Cell("no verdict", tone="muted", hint=verdict) if tone is None else Cell(verdict, tone=tone)

@@ -109,14 +109,13 @@ def _table(dataset: DatasetPart, gyros: Mapping[str, Record], number: int) -> Ma
     notes = Notes()
     columns = [
         Column("figure", numeric=False),
-        Column("unit", numeric=False),
         *(Column(name) for name in gyros),
         Column("floor", hint=FLOOR_WORDS),
     ]
     rows = []
     for key, figure in MAIN:
         cells = [_main_cell(record, key, notes) for record in gyros.values()]
-        rows.append(Row((Cell(figure.title, hint=figure.meaning), Cell(figure.unit), *cells, Cell(""))))
+        rows.append(Row((Cell(figure.title, figure.unit, hint=figure.meaning), *cells, Cell(""))))
     for name in dict.fromkeys(name for record in gyros.values() for name in record.get("figures") or {}):
         found = [(record.get("figures") or {}).get(name) for record in gyros.values()]
         rows.append(_figure_row(name, found, dataset.calibration_figures.get(name), notes))
@@ -133,14 +132,13 @@ def _main_cell(record: Record, key: str, notes: Notes) -> Cell:
 def _figure_row(name: str, found: Sequence[Record | None], figure: Figure | None, notes: Notes) -> Row:
     unit = next((str(one["unit"]) for one in found if one), "")
     title, meaning = (figure.title, figure.meaning) if figure else (name.replace("_", " "), "")
-    head = (Cell(title, hint=meaning), Cell(unit))
+    head = Cell(title, unit, hint=meaning)
     reasons = {str(one["note"]) for one in found if one and one["state"] == "not measured"}
     if len(reasons) == 1 and all(one is None or one["state"] == "not measured" for one in found):
-        return Row((*head, Cell(f"not measured: {reasons.pop()}", tone="muted", span=len(found) + 1)))
+        return Row((head, Cell(f"not measured: {reasons.pop()}", tone="muted", span=len(found) + 1)))
     floors = [float(one["floor"]) for one in found if one and one["floor"] is not None]
-    return Row(
-        (*head, *(figure_cell(one, notes) for one in found), Cell(_range((min(floors), max(floors))) if floors else ""))
-    )
+    floor = _range((min(floors), max(floors))) if floors else ""
+    return Row((head, *(figure_cell(one, notes) for one in found), Cell(floor)))
 
 
 def figure_cell(figure: Record | None, notes: Notes) -> Cell:

@@ -139,9 +139,7 @@ def _arch_sentences(dataset: DatasetPart) -> list[Conclusion]:
     """What the ARCH effects of each array at rest are, gyros of one verdict together."""
     found = []
     for array in at_rest(dataset):
-        groups: dict[str, list[str]] = {}
-        for gyro, verdict in verdicts(array).items():
-            groups.setdefault(verdict, []).append(gyro)
+        groups = verdicts(array)
         if groups:
             listed = "; ".join(f"{verdict}: {named(gyros)}" for verdict, gyros in groups.items())
             text = f"ARCH effects of the level (axis {array.axis}, {array.recording}): {listed}."
