@@ -303,12 +303,15 @@ def artefacts_of(wildcards):
                 "spectrum",
                 "metrics",
                 "correlation",
+                "cross_allan",
+                "tones",
                 "fused",
                 "methods",
                 "crosscheck",
             )
             paths += [f"{folder}/{table}.parquet" for table in tables]
             if has_volatility(dataset, recording):
+                paths.append(f"{folder}/effects.parquet")
                 parts = ("arch_lm", "garch", "dcc", "weights", "fits")
                 paths += [
                     f"{folder}/{name}/{part}.parquet"
