@@ -16,8 +16,10 @@ from vgyro.volatility.whiten import FEWEST_SAMPLES, Line, Whitened, block_gain, 
 
 LONG_LAGS = 12
 """Lags of a second ARCH-LM test: it sees a small α with a large β, which one lag does not."""
-VARIANCE_LEVEL = 0.01
-"""Level of each of the two ARCH-LM tests of the whitened series."""
+VARIANCE_LEVEL = 0.02
+"""Level of each of the two ARCH-LM tests of the whitened series; positive correlation of squares is half of it."""
+MODEL_LEVEL = 0.01
+"""Level at which ARCH-LM of the standardised series says that GARCH(1,1) does not explain the effect."""
 DRIFT_LEVEL = 0.01
 LEVEL_LEVEL = 0.05
 """Level at which the ARCH-LM test of the level counts as failed, as in Liu et al. (2015)."""
@@ -90,6 +92,7 @@ class Evidence:
 
     level, detrended, whitened, standardised : ARCH-LM of the four series
     calm, calm_long : ARCH-LM of the whitened series without its short disturbances, with few and with LONG_LAGS lags
+    attract, attract_long : True if the squares correlate positively over those lags, as an ARCH process makes them
     kurtosis, calm_kurtosis : of the whitened series, and without disturbances
     drift     : ARCH-LM that the drift makes alone; None: there is no drift, or the level's test is passed
     moved     : deg/s, how far the drift goes
@@ -106,6 +109,8 @@ class Evidence:
     standardised_long: tuple[float, float]
     calm: tuple[float, float]
     calm_long: tuple[float, float]
+    attract: bool
+    attract_long: bool
     kurtosis: float
     calm_kurtosis: float
     drift: float | None
@@ -117,7 +122,8 @@ class Evidence:
     @property
     def heteroskedastic(self) -> bool:
         """True if the variance changes: one of the two tests of the whitened series fails without the knocks."""
-        return self.calm[1] < VARIANCE_LEVEL or self.calm_long[1] < VARIANCE_LEVEL
+        few = self.attract and self.calm[1] < VARIANCE_LEVEL
+        return few or (self.attract_long and self.calm_long[1] < VARIANCE_LEVEL)
 
     @property
     def disturbed(self) -> bool:
@@ -132,14 +138,19 @@ def gather_evidence(
 
     span : samples of the running mean and median;  lags : of ARCH-LM;  tones : of the rate;  garch : its model, or None
 
-    The rules. T = 3600 samples of white noise get any verdict but `nothing` in less than 5 % of cases.
-    Heteroskedastic: ARCH-LM of the whitened series fails at 1 %, with `lags` or with 12 lags, short disturbances left
-    out. Disturbance: samples that noise of constant variance does not make (1 of 1000 series), in at most 5 episodes
-    of at most 30 s. Drift: the level fails ARCH-LM at 5 %; means over `span` samples scatter more than the noise lets
-    them (chi², 1 %); and the drift with noise of constant variance would make ARCH-LM fail at 1 %. Tone: a line in the
-    series (1 %; vgyro.volatility.whiten) that makes ARCH-LM fail alone at 1 %, or holds 1 % of the variance; or a line
-    of the rate that would hold 10 % of the variance, where the detrended series fails. Correlation: nothing else, and
-    the correlation of neighbours makes the detrended series fail ARCH-LM at 1 %.
+    The rules; white noise gets any verdict but `nothing` in less than 5 % of cases (T = 360 and 3600).
+    heteroskedastic : ARCH-LM of the whitened series fails at 2 %, with `lags` or with 12 lags, short disturbances left
+                      out, and the squares correlate positively (α >= 0; one-sided as in Lee & King 1993)
+    disturbance     : samples that noise of constant variance does not make (1 of 1000 series), in at most 5 episodes of
+                      at most 30 s; beside heteroskedastic, only one of more than 20 standard deviations
+    drift           : the level fails ARCH-LM at 5 %; means over `span` samples scatter more than the noise lets them
+                      (chi², 1 %); and the drift with noise of constant variance would make ARCH-LM fail at 1 %
+    tone            : a line in the series (1 %; vgyro.volatility.whiten) that makes ARCH-LM fail alone at 1 %, or holds
+                      1 % of the variance; or a line of the rate that would hold 10 % of the variance, where the
+                      detrended series fails at 1 %. It is named by the line of the rate that is seen at that place,
+                      aliased, with that amplitude, the gain of the means counted (within a factor of 3).
+    correlation     : nothing else, and the correlation of neighbours makes the detrended series fail ARCH-LM at 1 %.
+                      Correlation over more than about a tenth of `span` counts as drift.
     Of a component d_t, with noise n_t of variance s² and kurtosis κ, e² = (d + n)² has the autocorrelation
     ρ = cov(d²_t, d²_{t+1})/(var(d²) + 4 mean(d²) s² + (κ - 1) s⁴), and ARCH-LM is about T·ρ² [derived].
     """
@@ -161,6 +172,7 @@ def gather_evidence(
     return Evidence(
         lags, level, loose, _test(parts.residual, lags), standard, standard_long,
         _test(residual, lags, calm), _test(residual, LONG_LAGS, calm),
+        _attract(residual, lags, calm), _attract(residual, LONG_LAGS, calm),
         float(kurtosis(parts.residual[:, None])[0]), tails,
         drift, float(np.ptp(parts.drift)), _tone(parts, noise, sampled, tones, loose[1]), episodes,
         _neighbours(rest, parts, loose[1], len(series)),
@@ -191,6 +203,12 @@ def _test(series: np.ndarray, lags: int, keep: np.ndarray | None = None) -> tupl
     except TooShort:
         return math.nan, math.nan
     return float(found.statistic[0]), float(found.p_value[0])
+
+
+def _attract(series: np.ndarray, lags: int, keep: np.ndarray) -> bool:
+    """True if the squares' autocovariances over the lags have a positive sum."""
+    away = np.where(keep, np.square(series) - np.mean(np.square(series[keep])), 0.0)
+    return sum(float(away[lag:] @ away[:-lag]) for lag in range(1, lags + 1)) > 0
 
 
 def _standardised(series: np.ndarray, garch: Garch | None, lags: int) -> tuple[tuple[float, float], ...]:
@@ -264,7 +282,7 @@ def _tone(
             return SeenTone(line.frequency, line.amplitude, line.frequency, line.amplitude, False, share, statistic)
         return SeenTone(source.frequency, source.amplitude, line.frequency, line.amplitude, True, share, statistic)
     reaching = [(tone.amplitude * _gain(tone, sampled), tone) for tone in tones]
-    if not reaching or not p_detrended < VARIANCE_LEVEL:
+    if not reaching or not p_detrended < DRIFT_LEVEL:
         return None
     seen, tone = max(reaching, key=lambda pair: pair[0])
     share = seen**2 / 2 / total
@@ -295,7 +313,7 @@ def _gain(tone: RateTone, sampled: Sampled) -> float:
 
 def _neighbours(rest: np.ndarray, parts: Whitened, p_detrended: float, samples: int) -> float | None:
     """Correlation of neighbouring samples, if it makes the squares correlate (as its square) beyond chance."""
-    if not parts.autoregression.size or not p_detrended < VARIANCE_LEVEL:
+    if not parts.autoregression.size or not p_detrended < DRIFT_LEVEL:
         return None
     correlation = float(rest[1:] @ rest[:-1] / (rest @ rest))
     return correlation if samples * correlation**4 > _limit(DRIFT_LEVEL) else None

@@ -12,8 +12,8 @@ from vgyro.volatility.effects import (
     FEWEST_SAMPLES,
     LEVEL_LEVEL,
     LONG_LAGS,
+    MODEL_LEVEL,
     PAUSE_S,
-    VARIANCE_LEVEL,
     Episode,
     Evidence,
     Garch,
@@ -139,7 +139,7 @@ def _sentence(evidence: Evidence, others: Sequence[Evidence | None], sampled: Sa
 
 
 def _variance_clause(evidence: Evidence) -> str:
-    few = evidence.calm[1] <= evidence.calm_long[1]
+    few = evidence.attract and (evidence.calm[1] <= evidence.calm_long[1] or not evidence.attract_long)
     lags, test = (evidence.lags, evidence.calm) if few else (LONG_LAGS, evidence.calm_long)
     without = "drift, tones, correlation and disturbances" if evidence.episodes else "drift, tones and correlation"
     return (
@@ -152,7 +152,7 @@ def _garch_clause(evidence: Evidence, garch: Garch | None) -> list[str]:
     """Whether GARCH(1,1) of the level explains the effect; a knock rules the fit, which then says nothing."""
     if garch is None or evidence.disturbed or not math.isfinite(evidence.standardised[1]):
         return []
-    fits = min(evidence.standardised[1], evidence.standardised_long[1]) >= VARIANCE_LEVEL
+    fits = min(evidence.standardised[1], evidence.standardised_long[1]) >= MODEL_LEVEL
     found = f"GARCH(1,1) of the level (α = {garch.alpha:.2f}, β = {garch.beta:.2f})"
     worse = (
         evidence.standardised
