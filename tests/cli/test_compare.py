@@ -15,7 +15,7 @@ ROWS = {  # metric: (value, low, high)
 }
 
 
-def write(path, rows, unit="deg/√h", recording="rest"):
+def write(path, rows, unit="deg/√h", recording="rest", rates=None):
     columns = {
         "recording": [recording] * len(rows),
         "axis": ["z"] * len(rows),
@@ -28,6 +28,8 @@ def write(path, rows, unit="deg/√h", recording="rest"):
         "unit": [unit] * len(rows),
         "note": [""] * len(rows),
     }
+    if rates is not None:
+        columns["true_rate"] = rates
     write_table(path, columns, "metrics", Provenance({}, "", ""))
     return path
 
@@ -100,6 +102,14 @@ def test_data_sets_are_told_apart_by_their_folders(tmp_path, vgyro):
         write(tmp_path / run / "two/rest/z/metrics.parquet", {"arw": (value, NAN, NAN)})
     outcome = vgyro("compare", tmp_path / "a", tmp_path / "b")
     assert outcome.out.splitlines()[0].startswith("two rest z average arw: 6 → 7")
+
+
+def test_figures_at_another_rate_are_figures_of_their_own(tmp_path, vgyro):
+    for run, rate in (("a", 0.05), ("b", 0.1)):
+        write(tmp_path / run / "metrics.parquet", {"arw": (6.0, NAN, NAN), "mean": (0.1, NAN, NAN)}, rates=[0.0, rate])
+    lines = vgyro("compare", tmp_path / "a/metrics.parquet", tmp_path / "b/metrics.parquet").out.splitlines()
+    assert lines[0].startswith("rest z average mean at 0.05 deg/s: 0.1 → –")
+    assert lines[-1] == "3 figures: 1 same, 1 only in A, 1 only in B"
 
 
 def test_json_holds_every_figure(pair, vgyro):
