@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.fusion import METHODS, FilterParameters, Fused, SampleWeights
-from vgyro.fusion.response import measured_response
+from vgyro.fusion import METHODS, FilterParameters, Fused, SampleWeights, measured_response
 
 SAMPLES, RATE_HZ = 140_000, 200.0
 FILTERS = ("jiang_markov", "jiang_random_walk", "xue_2012", "chang_2012")

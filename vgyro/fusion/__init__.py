@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, Method
     from vgyro.fusion.blocks import SampleWeights, block_of_sample
     from vgyro.fusion.registry import METHODS, Outcome, run_methods, select
+    from vgyro.fusion.response import Response, measured_response
     from vgyro.fusion.weights import min_variance_weights, usable
 
 __all__ = [
@@ -19,8 +20,10 @@ __all__ = [
     "Fused",
     "Method",
     "Outcome",
+    "Response",
     "SampleWeights",
     "block_of_sample",
+    "measured_response",
     "min_variance_weights",
     "run_methods",
     "select",
@@ -30,6 +33,7 @@ __all__ = [
 _ARRAY = ("ArrayNoise", "ArrayRates", "CannotRun", "FilterParameters", "Fused", "Method")
 _REGISTRY = ("METHODS", "Outcome", "run_methods", "select")
 _BLOCKS = ("SampleWeights", "block_of_sample")
+_RESPONSE = ("Response", "measured_response")
 _WEIGHTS = ("min_variance_weights", "usable")
 
 __getattr__ = lazy_exports(
@@ -38,6 +42,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(_ARRAY, "array"),
         **dict.fromkeys(_BLOCKS, "blocks"),
         **dict.fromkeys(_REGISTRY, "registry"),
+        **dict.fromkeys(_RESPONSE, "response"),
         **dict.fromkeys(_WEIGHTS, "weights"),
     },
 )

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -15,8 +16,7 @@ import numpy as np
 import pyarrow as pa
 
 from vgyro.dataset import AT_REST
-from vgyro.fusion import Outcome, run_methods, select
-from vgyro.fusion.response import measured_response
+from vgyro.fusion import Outcome, measured_response, run_methods, select
 from vgyro.storage.tables import ROW_GROUP, TableWriter, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.fusion_inputs import OpenArray, open_array
@@ -122,17 +122,17 @@ def run_moved(opened: OpenArray, rows: list[Row], moved: Columns, why: str) -> l
         for method in methods
         for definition, reason in method.same_at_any_rate.items()
     }
-    if why or not rows:
-        found = dict.fromkeys(((row["method"], row["definition"]) for row in rows), f"not known: {why}")
-    else:
+    found = dict.fromkeys(((row["method"], row["definition"]) for row in rows), f"not known: {why}")
+    if not why and rows:
         definitions = opened.volatility.definitions
         outcomes = run_methods(opened.move(), opened.parameters, methods, definitions, moved=True)
-        found = dict(keep_error(outcome, opened.injected_rate or 0.0, moved) for outcome in outcomes)
+        # No outcome is held while the next one is made.
+        found = dict(map(partial(keep_error, opened.injected_rate or 0.0, moved), outcomes))
     said = {**found, **same}
     return [{**row, "moved": said[row["method"], row["definition"]] if row["column"] else ""} for row in rows]
 
 
-def keep_error(outcome: Outcome, added: float, moved: Columns) -> tuple[tuple[str, str], str]:
+def keep_error(added: float, moved: Columns, outcome: Outcome) -> tuple[tuple[str, str], str]:
     """Keep the error of a fused rate; the method and definition, and its column or why there is none."""
     key = (outcome.method.name, outcome.definition)
     logging.info("%s at %g deg/s: %s", outcome.column or outcome.method.name, added, outcome.note or "ok")
