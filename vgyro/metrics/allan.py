@@ -13,6 +13,7 @@ from vgyro.errors import TooShort
 from vgyro.metrics.noise_type import noise_exponents
 from vgyro.metrics.robust import robust_differences, robust_edf, without_outliers
 from vgyro.metrics.sampling import Sampling
+from vgyro.metrics.slots import SlotSums
 
 TAUS_PER_OCTAVE = 3
 LONGEST_TAU = 3  # the longest τ is a third of the longest segment
@@ -42,11 +43,11 @@ class AllanCurve:
 
 @dataclass(frozen=True)
 class _Series:
-    """rate [T]; edges [S + 1] of its stretches, in samples, or in slots where `slot` [T] says which are there."""
+    """rate [T]; edges [S + 1] of its stretches, in samples; or in slots, where samples are lost: then sums of it."""
 
     rate: np.ndarray
     edges: np.ndarray
-    slot: np.ndarray | None = None
+    sums: SlotSums | None = None
 
 
 def allan_deviation(
@@ -96,7 +97,8 @@ def allan_deviation(
     rate = np.asarray(rate, dtype=float)
     if kind == "robust":
         rate, sampling = without_outliers(rate, rate_hz, sampling, segment)
-    series = _series(rate, segment, sampling)
+    allan = engines.get(engine).allan
+    series = _series(rate, segment, sampling, allan, kind)
     lengths, alike = np.unique(np.diff(series.edges), return_counts=True)
     longest = int(lengths.max(initial=0))
     factors = averaging_factors(rate_hz, longest, taus, per_octave, LONGEST[kind])
@@ -105,13 +107,12 @@ def allan_deviation(
             f"the longest gap-free stretch has {longest} samples",
             remedy=f"An Allan deviation ({kind}) needs {LONGEST[kind]} samples in a row",
         )
-    allan = engines.get(engine).allan
     variance, share = _variances(series, factors, allan, kind)
     kept = share >= LEAST_USED
     if not kept.any():
         raise TooShort("lost samples leave too few differences at every τ", remedy="Look for a less damaged recording")
     factors, variance, share = factors[kept], variance[kept], share[kept]
-    exponent = noise_exponents(rate, series.edges, factors, allan, series.slot)
+    exponent = noise_exponents(rate, series.edges, factors, allan, series.sums)
     edf = np.empty(factors.size)
     for row, (m, alpha) in enumerate(zip(factors.tolist(), exponent.tolist(), strict=True)):
         used = lengths >= LONGEST[kind] * m
@@ -125,30 +126,33 @@ def allan_deviation(
     return AllanCurve(factors / rate_hz, deviation, low, high, edf, exponent, confidence, kind)
 
 
-def _series(rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None) -> _Series:
+def _series(
+    rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: ModuleType, kind: str
+) -> _Series:
     if sampling is None:
         return _Series(rate, edges_of(len(rate), segment))
     if len(sampling) != len(rate):
         raise ValueError(f"{len(rate)} rates, but {len(sampling)} samples")
-    if sampling.missing == 0:
+    if sampling.missing == 0 and kind != "robust":
         return _Series(rate, edges_of(len(rate), sampling.stretch))
     slot, edges = sampling.slots()
-    return _Series(rate, edges, slot)
+    return _Series(rate, edges, SlotSums.of(rate, slot, edges, allan))
 
 
 def _variances(series: _Series, factors: np.ndarray, allan: ModuleType, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Variance at each factor, and the share of the differences there are."""
-    rate, edges, slot = series.rate, series.edges, series.slot
+    sums, share = series.sums, LONGEST[kind]
+    if sums is None:
+        squares, counts = allan.differences(series.rate, factors, series.edges, share, kind)
+        return squares / np.maximum(counts, 1), (counts > 0).astype(float)
     if kind == "robust":
-        return robust_differences(rate, np.arange(len(rate)) if slot is None else slot, edges, factors, LONGEST[kind])
-    if slot is None:
-        sums, counts = allan.differences(rate, factors, edges, LONGEST[kind], kind)
-        return sums / np.maximum(counts, 1), (counts > 0).astype(float)
-    sums, excess, counts, possible = allan.differences_over_losses(rate, factors, slot, edges, LONGEST[kind], kind)
-    singles, _, number, _ = allan.differences_over_losses(rate, SINGLE, slot, edges, 2)
+        return robust_differences(sums, factors, share)
+    parts = sums.total, sums.have, sums.edges
+    squares, excess, counts, possible = allan.differences_over_losses(*parts, factors, share, kind)
+    singles, _, number, _ = allan.differences_over_losses(*parts, SINGLE, 2)
     single = variance_of_samples(singles / np.maximum(number, 1), number > 0)
     some = np.maximum(counts, 1)
-    return np.maximum(sums / some - single * excess / some, 0.0), counts / np.maximum(possible, 1)
+    return np.maximum(squares / some - single * excess / some, 0.0), counts / np.maximum(possible, 1)
 
 
 def variance_of_samples(variance: np.ndarray, known: np.ndarray) -> float:

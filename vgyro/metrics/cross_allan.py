@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,7 +67,8 @@ def cross_allan(
     factors = averaging_factors(rate_hz, int(lengths.max(initial=0)), taus)
     if factors.size == 0:
         raise TooShort(f"the longest stretch has {lengths.max(initial=0)} samples", remedy="3 in a row are needed")
-    sums = SlotSums.of(rate, slot, edges)
+    allan = engines.get(engine).allan
+    sums = SlotSums.of(rate, slot, edges, allan)
     found = [_covariance(sums, m) for m in factors.tolist()]
     share = np.array([part for _, part in found])
     kept = share >= LEAST_USED
@@ -75,8 +76,8 @@ def cross_allan(
         raise TooShort("lost samples leave too few differences at every τ", remedy="Look for a less damaged recording")
     factors, share = factors[kept], share[kept]
     covariance = np.stack([matrix for (matrix, _), good in zip(found, kept, strict=True) if good])
-    allan = engines.get(engine).allan
-    exponents = [noise_exponents(column, edges, factors, allan, slot) for column in np.ascontiguousarray(rate.T)]
+    single = [replace(sums, total=np.ascontiguousarray(column)) for column in sums.total.T]
+    exponents = [noise_exponents(rate, edges, factors, allan, one) for one in single]
     freedom = np.empty((len(factors), rate.shape[1]))
     for row, m in enumerate(factors.tolist()):
         used = lengths >= LONGEST_TAU * m

@@ -16,14 +16,14 @@ STEPS = (0, -1, -2)
 
 
 def noise_exponents(
-    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType, slot: np.ndarray | None = None
+    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType, sums: SlotSums | None = None
 ) -> np.ndarray:
     """Exponent of the power spectrum at each averaging factor: 2 … -4, never rising with τ.
 
     rate    : array [T];  edges : array [S + 1] int, first sample of each gap-free stretch, and T
     factors : array [M] int, ascending averaging factors;  allan : that module of an engine
-    slot    : array [T] int, place of each sample on an even time grid, where samples are lost within the stretches;
-              edges then count slots, and a block of m slots counts where half of its samples are there
+    sums    : of rate, where samples are lost within the stretches: then edges are not needed, and a block of m slots
+              counts where half of its samples are there
     returns : array [M] int
     With 30 block means or more: lag-1 autocorrelation (Riley & Greenhall, "Power law noise identification using the
     lag 1 autocorrelation", EFTF 2004). With fewer: the ratio of the sample variance to the Allan variance (B1, Barnes
@@ -31,10 +31,10 @@ def noise_exponents(
     steeper one governs the longer τ, so the sequence is made monotone (isotonic regression, weight: block means):
     one chance result among many τ would else multiply its degrees of freedom by ten.
     """
-    if slot is None:
+    if sums is None:
         raw, weight = _of_whole(rate, edges, factors, allan)
     else:
-        raw, weight = _over_losses(SlotSums.of(rate, slot, edges), factors, allan)
+        raw, weight = _over_losses(sums, factors, allan)
     return np.round(_falling(raw, weight)).astype(np.int64)
 
 

@@ -10,7 +10,7 @@ from vgyro.metrics.slots import SlotSums
 
 THRESHOLD = 6.0  # scales from the level: one in 5e8 samples of Gaussian noise
 MEDIAN_OF_SQUARE = 0.454936423119573  # median of chi² with one degree of freedom
-MOST_DIFFERENCES = 1 << 20
+MOST_DIFFERENCES = 1 << 18
 DENSE = 64
 EFFICIENCY = {1: 0.39, 2: 0.49}
 """By m (the last also for more): variance of the mean of the squared overlapping differences over that of their
@@ -31,18 +31,14 @@ def without_outliers(
     return (rate[~outlier], sampling.without(outlier)) if outlier.any() else (rate, sampling)
 
 
-def robust_differences(
-    rate: np.ndarray, slot: np.ndarray, edges: np.ndarray, factors: np.ndarray, share: int
-) -> tuple[np.ndarray, np.ndarray]:
+def robust_differences(sums: SlotSums, factors: np.ndarray, share: int) -> tuple[np.ndarray, np.ndarray]:
     """Median of the squared differences of adjacent means over twice that of chi², and the share of them there are.
 
-    rate    : array [T], deg/s;  slot : array [T] int, place of each sample;  edges : [S + 1], stretches, in slots
     factors : array [M] int;  share : stretches of less than share·m slots are left out
     returns : variance [M] (deg/s)², share [M]
     Heavy stretches that a twentieth of the differences touch raise it by less than a tenth. Losses as in
     allan_deviation.
     """
-    sums = SlotSums.of(rate, slot, edges)
     singles = [_median(sums, m, 2)[0] for m in (1, 2, 4, 8)]
     known = np.isfinite(singles)
     halvings = int(np.argmin(np.append(known, False)))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
 
 PRESENT_TENTHS = 9
 """A mean counts where so many tenths of its samples are there."""
+MOST_BLOCKS = 1 << 20
+PIECE = 1 << 12
 
 
 @dataclass(frozen=True)
@@ -23,21 +26,13 @@ class SlotSums:
     edges: np.ndarray
 
     @classmethod
-    def of(cls, rate: np.ndarray, slot: np.ndarray, edges: np.ndarray) -> SlotSums:
-        """rate [T] or [T, N], deg/s; slot [T] int, rising; edges [S + 1] in slots, every stretch with a sample."""
-        slots, stretches = int(edges[-1]), len(edges) - 1
-        first = np.searchsorted(slot, edges[:-1])
-        number = np.diff(np.append(first, len(slot)))
-        stretch = np.repeat(np.arange(stretches), number)
-        mean = np.add.reduceat(rate, first, axis=0, dtype=float) / number.reshape(-1, *[1] * (rate.ndim - 1))
-        # The sum before border b of stretch s is at b + s; a sample adds to the border behind its slot.
-        place = slot + stretch + 1
-        total = np.zeros((slots + stretches, *rate.shape[1:]))
-        total[place] = rate - mean[stretch]
-        np.cumsum(total, axis=0, out=total)
-        have = np.zeros(slots + stretches, dtype=np.int32)
-        have[place] = 1
-        return cls(total, np.cumsum(have, dtype=np.int32), edges)
+    def of(cls, rate: np.ndarray, slot: np.ndarray, edges: np.ndarray, allan: ModuleType) -> SlotSums:
+        """rate [T] or [T, N], deg/s; slot [T] int, rising; edges [S + 1] in slots; allan: that module of an engine."""
+        if rate.ndim == 1:
+            total, have = allan.slot_sums(rate, slot, edges)
+            return cls(total, have, edges)
+        columns = [allan.slot_sums(np.ascontiguousarray(column), slot, edges) for column in rate.T]
+        return cls(np.column_stack([total for total, _ in columns]), columns[0][1], edges)
 
     def differences(self, factor: int, stride: int, share: int) -> tuple[np.ndarray, np.ndarray, int]:
         """Differences of adjacent means over `factor` slots.
@@ -65,14 +60,21 @@ class SlotSums:
         """Means of adjacent blocks of `factor` slots that have half of their samples, about those of their stretches.
 
         returns : means [b]; edges [R + 1] of the runs of adjacent ones, and b
+        Of more than a million blocks, pieces of 4096, evenly spread, stand for all.
         """
         number = np.diff(self.edges) // factor
-        stretch = np.repeat(np.arange(len(number)), number)
-        within = np.arange(int(number.sum())) - np.repeat(np.cumsum(number) - number, number)
+        every = max(1, -(-int(number.sum()) // MOST_BLOCKS))
+        pieces = -(-number // PIECE)
+        stretch = np.repeat(np.arange(len(number)), pieces)
+        piece = np.arange(int(pieces.sum())) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        stretch, piece = stretch[::every], piece[::every]
+        within = (piece[:, None] * PIECE + np.arange(PIECE)).ravel()
+        stretch = np.repeat(stretch, PIECE)
+        inside = within < number[stretch]
+        stretch, within = stretch[inside], within[inside]
         at = self.edges[stretch] + stretch + within * factor
         have = self.have[at + factor] - self.have[at]
         good = 2 * have >= factor
         means = (self.total[at + factor] - self.total[at])[good] / have[good]
-        kept = np.flatnonzero(good)
-        apart = (np.diff(kept) != 1) | (np.diff(stretch[good]) != 0)
+        apart = (np.diff(at[good]) != factor) | (np.diff(stretch[good]) != 0)
         return means, np.concatenate([[0], np.flatnonzero(apart) + 1, np.full(int(len(means) > 0), len(means))])

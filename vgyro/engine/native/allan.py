@@ -10,7 +10,7 @@ import numpy as np
 from vgyro.engine.native import _allan, pool
 from vgyro.engine.native.allan_freedom import degrees_of_freedom, limits
 
-__all__ = ["degrees_of_freedom", "differences", "differences_over_losses", "lag_products", "limits", "strides"]
+__all__ = ["degrees_of_freedom", "differences", "differences_over_losses", "lag_products", "limits", "slot_sums"]
 
 PIECE = 256  # blocks of _allan.BLOCK differences
 ORDER = {"overlapping": 2, "hadamard": 3}
@@ -74,19 +74,34 @@ def _summed(
     return parts.sum(axis=1)
 
 
+def slot_sums(rate: np.ndarray, slot: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of the samples before each border of a slot, and how many there are, in stretches in which samples are lost.
+
+    rate    : array [T], deg/s;  slot : array [T] int, place of each sample on an even time grid, rising
+    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
+    returns : total [P], of the samples about the mean of their stretch; have [P] int32. P = slots + S borders: those of
+              a stretch one after another, first and last included
+    """
+    edges = np.ascontiguousarray(edges, dtype=np.int64)
+    borders = int(edges[-1]) + len(edges) - 1
+    total, have = np.zeros(borders), np.zeros(borders, dtype=np.int32)
+    if len(rate):
+        rate = np.ascontiguousarray(rate, dtype=np.float64)
+        _allan.slots(rate, np.ascontiguousarray(slot, dtype=np.int64), edges, total, have)
+    return total, have
+
+
 def differences_over_losses(
-    rate: np.ndarray,
-    factors: np.ndarray,
-    slot: np.ndarray,
+    total: np.ndarray,
+    have: np.ndarray,
     edges: np.ndarray,
+    factors: np.ndarray,
     share: int = 3,
     kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The same over stretches in which samples are lost: differences of the means of the samples that are there.
 
-    rate    : array [T], deg/s;  factors : array [M] int, averaging factors m
-    slot    : array [T] int, place of each sample on an even time grid, rising
-    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
+    total, have, edges : of slot_sums;  factors : array [M] int, averaging factors m
     share   : stretches of less than share·m slots are left out
     kind    : overlapping, modified or hadamard
     returns : sums [M] in (deg/s)²; excess [M]; counts [M]; possible [M], differences there would be without a loss
@@ -99,24 +114,21 @@ def differences_over_losses(
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     edges = np.ascontiguousarray(edges, dtype=np.int64)
     steps = strides(factors)
-    totals, counts = np.zeros((len(factors), 2)), np.zeros(len(factors), dtype=np.int64)
-    if factors.size and rate.size:
-        angle, have = np.empty(edges[-1] + len(edges) - 1), np.empty(edges[-1] + len(edges) - 1, dtype=np.int32)
-        rate = np.ascontiguousarray(rate, dtype=np.float64)
-        _allan.slots(rate, np.ascontiguousarray(slot, dtype=np.int64), edges, angle, have)
+    found, counts = np.zeros((len(factors), 2)), np.zeros(len(factors), dtype=np.int64)
+    if factors.size and total.size:
         order = ORDER.get(kind, 0)
         pool.run(
             lambda start, stop: _allan.lossy(
-                angle, have, edges, factors, steps, order, share, PRESENT_TENTHS, totals, counts, start, stop
+                total, have, edges, factors, steps, order, share, PRESENT_TENTHS, found, counts, start, stop
             ),
             len(factors),
             1,
         )
-    totals /= WEIGHTS[kind]
+    found /= WEIGHTS[kind]
     if kind == "modified":
         # White noise of m slots: the modified variance is this part of the other one.
-        totals[:, 1] *= (factors**2 + 1) / (2 * factors**2)
-    return totals[:, 0], totals[:, 1], counts, possible_differences(factors, np.diff(edges), share, kind)
+        found[:, 1] *= (factors**2 + 1) / (2 * factors**2)
+    return found[:, 0], found[:, 1], counts, possible_differences(factors, np.diff(edges), share, kind)
 
 
 def strides(factors: np.ndarray) -> np.ndarray:

@@ -52,19 +52,36 @@ def differences(
     return sums, counts
 
 
+def slot_sums(rate: np.ndarray, slot: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of the samples before each border of a slot, and how many there are, in stretches in which samples are lost.
+
+    rate    : array [T], deg/s;  slot : array [T] int, place of each sample on an even time grid, rising
+    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
+    returns : total [P], of the samples about the mean of their stretch; have [P] int32. P = slots + S borders: those of
+              a stretch one after another, first and last included
+    """
+    totals, haves = [], []
+    for start, stop in itertools.pairwise(edges.tolist()):
+        inside = (slot >= start) & (slot < stop)
+        there, filled = np.zeros(stop - start + 1, dtype=np.int32), np.zeros(stop - start + 1)
+        there[slot[inside] - start + 1] = 1
+        filled[slot[inside] - start + 1] = rate[inside] - (rate[inside].mean() if inside.any() else 0.0)
+        totals.append(np.cumsum(filled))
+        haves.append(np.cumsum(there, dtype=np.int32))
+    return np.concatenate([np.empty(0), *totals]), np.concatenate([np.empty(0, np.int32), *haves])
+
+
 def differences_over_losses(
-    rate: np.ndarray,
-    factors: np.ndarray,
-    slot: np.ndarray,
+    total: np.ndarray,
+    have: np.ndarray,
     edges: np.ndarray,
+    factors: np.ndarray,
     share: int = 3,
     kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The same over stretches in which samples are lost: differences of the means of the samples that are there.
 
-    rate    : array [T], deg/s;  factors : array [M] int, averaging factors m
-    slot    : array [T] int, place of each sample on an even time grid, rising
-    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
+    total, have, edges : of slot_sums;  factors : array [M] int, averaging factors m
     share   : stretches of less than share·m slots are left out
     kind    : overlapping, modified or hadamard
     returns : sums [M] in (deg/s)²; excess [M]; counts [M]; possible [M], differences there would be without a loss
@@ -76,33 +93,26 @@ def differences_over_losses(
     allantools would take a mean of any number of samples, or one that bridges any gap.
     """
     found = np.zeros((4, len(factors)))
-    for start, stop in itertools.pairwise(edges.tolist()):
-        inside = (slot >= start) & (slot < stop)
-        there = np.zeros(stop - start)
-        there[slot[inside] - start] = 1
-        filled = np.zeros(stop - start)
-        filled[slot[inside] - start] = rate[inside] - (rate[inside].mean() if inside.any() else 0.0)
+    for stretch, (start, stop) in enumerate(itertools.pairwise(edges.tolist())):
+        borders = slice(start + stretch, stop + stretch + 1)
         for row, m in enumerate(factors.tolist()):
             if share * m <= stop - start and REACH[kind] * m <= stop - start:
-                found[:, row] += _one_stretch(filled, there, m, kind)
+                found[:, row] += _one_stretch(total[borders], have[borders], m, kind)
     return found[0], found[1], found[2].astype(np.int64), found[3].astype(np.int64)
 
 
-def _one_stretch(rate: np.ndarray, there: np.ndarray, m: int, kind: str) -> np.ndarray:
-    """sums, excess, counts, possible of one stretch; rate [T] is 0 where `there` is."""
+def _one_stretch(total: np.ndarray, have: np.ndarray, m: int, kind: str) -> np.ndarray:
+    """sums, excess, counts, possible of one stretch."""
     stride = max(m // DENSE, 1)
-    number, total = (
-        np.convolve(series, np.ones(m), "valid") if m < 64 else _moving(series, m) for series in (there, rate)
-    )
-    number = np.rint(number)
+    number = have[m:] - have[:-m]
     good = number >= PRESENT * m - 1e-9
-    mean = np.where(good, total, 0.0) / np.where(good, number, 1.0)
-    inverse = np.where(good, 1.0 / np.where(good, number, 1.0), 0.0)
+    inverse = np.where(good, 1.0 / np.where(good, number, 1), 0.0)
+    mean = (total[m:] - total[:-m]) * inverse
     weights = (1.0, -2.0, 1.0) if kind == "hadamard" else (-1.0, 1.0)
     starts = len(mean) - (len(weights) - 1) * m
     shifted = [slice(part * m, part * m + starts, stride) for part in range(len(weights))]
-    d = sum(weight * mean[at] for weight, at in zip(weights, shifted, strict=True))
-    e = sum(weight**2 * (inverse[at] - 1 / m) for weight, at in zip(weights, shifted, strict=True))
+    d = np.add.reduce([weight * mean[at] for weight, at in zip(weights, shifted, strict=True)])
+    e = np.add.reduce([weight**2 * (inverse[at] - 1 / m) for weight, at in zip(weights, shifted, strict=True)])
     valid = np.logical_and.reduce([good[at] for at in shifted])
     norm = sum(weight**2 for weight in weights)
     if kind == "modified":
@@ -111,11 +121,6 @@ def _one_stretch(rate: np.ndarray, there: np.ndarray, m: int, kind: str) -> np.n
         valid = count >= PRESENT * window - 1e-9
         d, e = d / np.maximum(count, 1), e / np.maximum(count, 1) * (m**2 + 1) / (2 * m**2)
     return np.array([np.sum(d[valid] ** 2) / norm, np.sum(e[valid]) / norm, valid.sum(), valid.size])
-
-
-def _moving(series: np.ndarray, m: int) -> np.ndarray:
-    total = np.concatenate(([0.0], np.cumsum(series)))
-    return total[m:] - total[:-m]
 
 
 def lag_products(
