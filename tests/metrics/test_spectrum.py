@@ -56,6 +56,14 @@ def test_segments_are_not_joined():
     assert spectrum.density[1:].max() < 3 * math.sqrt(2) * N
 
 
+def test_segments_are_as_long_as_half_of_the_samples_allow():
+    # By hand: stretches of 5, 20, 20, 20 and 25 s; half of the 90 s lie in stretches of 20 s or more, which hold four.
+    lengths = [500, 2000, 2000, 2000, 2500]
+    spectrum = spectral_density(white(9000, 100.0), 100.0, 100.0, np.repeat(np.arange(5), lengths))
+    assert spectrum.averages == 4
+    assert spectrum.frequency[1] == pytest.approx(1 / 20)
+
+
 def test_short_series_are_empty():
     assert spectral_density(np.arange(5.0), 1.0).frequency.size == 0
     density = noise_density(spectral_density(np.arange(5.0), 1.0), (0.1, 1.0))

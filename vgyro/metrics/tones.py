@@ -155,7 +155,9 @@ def _real_freedom(power: np.ndarray, level: np.ndarray, freedom: float) -> np.nd
 
     grid = np.geomspace(min(freedom, 2.0), freedom, 60)
     spread = np.log(chdtri(grid, 0.25) / chdtri(grid, 0.75))
-    ratio = np.log(np.where(level > 0, power / level, 1.0))
+    usable = np.isfinite(level) & (level > 0) & (power > 0)
+    ratio = np.full(power.size, np.nan)
+    ratio[usable] = np.log(power[usable] / level[usable])
     blocks = max(1, round(power.size / SPREAD))
     found = []
     for block in np.array_split(ratio, blocks):
