@@ -138,3 +138,36 @@ def test_a_change_of_scheme_redraws_the_plots(browser, pages: Path) -> None:  # 
     browser.set_scheme("dark")
     browser.wait_for(f"{colour} !== {before!r}")
     assert browser.errors == []
+
+
+@pytest.mark.parametrize("browser", [(1400, "dark")], indirect=True)
+def test_a_certificate_is_printed_alone_and_light_and_the_page_comes_back(browser, pages: Path) -> None:  # type: ignore[no-untyped-def]
+    browser.open(pages / "bench.html", "#certificate-x")
+    browser.wait_for("document.getElementById('scale-residuals-x').dataset.drawn")
+    seen = (
+        "window.print = () => { window.printed = {paper: getComputedStyle(document.body).backgroundColor,"
+        " drawn: document.querySelectorAll('.printed figure[data-drawn]').length,"
+        " width: document.querySelector('.printed').offsetWidth} }"
+    )
+    browser.run(seen)
+    browser.run("document.querySelector('#certificate-x button.print').click()")
+    browser.wait_for("window.printed")
+    printed = browser.run("window.printed")
+    assert printed["paper"] == "rgb(255, 255, 255)"
+    assert printed["drawn"] == 3
+    assert printed["width"] < 720
+    assert browser.run("document.body.className") == ""
+    assert browser.run("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+    assert browser.errors == []
+
+
+@pytest.mark.parametrize("browser", [(718, "dark")], indirect=True)
+def test_a_certificate_fits_a_sheet_of_paper(browser, pages: Path) -> None:  # type: ignore[no-untyped-def]
+    browser.open(pages / "bench.html")
+    browser.run("document.body.classList.add('alone')")
+    browser.run("document.getElementById('certificate-x').classList.add('printed')")
+    browser.call("Emulation.setEmulatedMedia", {"media": "print"})
+    # A4 less 10 mm margins is 718 px wide.
+    assert browser.run("document.documentElement.scrollWidth") <= 718
+    assert browser.run("[...document.querySelectorAll('h2, nav, footer')].filter(e => e.checkVisibility()).length") == 0
+    assert browser.run("document.querySelectorAll('#certificate-x table').length") == 1
