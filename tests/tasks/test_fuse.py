@@ -321,7 +321,8 @@ def test_motion_takes_the_wider_filter_and_warns(tmp_path):
 def test_crosscheck_without_weights_or_gyros_to_fuse(tmp_path):
     write_inputs(tmp_path, gyros=("g1",), seconds=30)
     fuse_in(tmp_path, gyros=("g1",))
-    empty = {"series": np.array([], dtype=str), "tau": np.empty(0), "deviation": np.empty(0), "low": np.empty(0)}
+    words = dict.fromkeys(("series", "kind"), np.array([], dtype=str))
+    empty = {**words, "tau": np.empty(0), "deviation": np.empty(0), "low": np.empty(0)}
     write_table(tmp_path / "allan.parquet", empty, "allan", Provenance({}, "", ""))
     inputs = {name: [f"{name}.parquet"] for name in ("rates", "fused", "methods", "allan")}
     inputs |= {"noise": ["noise.json"], "garch": [], "dcc": [], "weights": []}
