@@ -68,6 +68,14 @@ def run_calibrate(
     return read_json(folder / "calibration.json")
 
 
+def uncalibrated(folder: Path, board: Board, record: Manifest) -> dict:
+    """Calibrate from recordings that give nothing: those at rest are refused."""
+    resting = [recording for recording in record.recordings if recording.kind in ("static", "thermal")]
+    nothing = counts_of(board, np.empty(0))
+    frames = [write_frames(folder / f"refused-{recording.name}", nothing, "refused") for recording in resting]
+    return run_calibrate(folder, board, record, frames)
+
+
 def run_convert(
     folder: Path, board: Board, record: Manifest, name: str, frames: Path, logs: list[Path] | None = None
 ) -> dict[str, np.ndarray]:
@@ -127,7 +135,7 @@ def test_refused_recordings_are_skipped(tmp_path: Path, board: Board):
 
 def test_without_calibration_the_nominal_scale_is_named(tmp_path: Path, board: Board):
     record = manifest({"name": "static", "kind": "static", "files": "x.bin"})
-    found = run_calibrate(tmp_path, board, record, [])
+    found = uncalibrated(tmp_path, board, record)
     for gyro in board.gyros:
         row = found["gyros"][gyro.name]
         assert (row["source"], row["scale"], row["scale_low"]) == ("nominal", gyro.scale, None)
@@ -143,7 +151,7 @@ def test_without_calibration_the_nominal_scale_is_named(tmp_path: Path, board: B
 def test_rest_listed_found_and_clipped(tmp_path: Path, board: Board):
     listed = {"name": "listed", "kind": "free", "files": "x.bin", "rest": [[1.0, 2.0]]}
     record = manifest(listed, {"name": "found", "kind": "free", "files": "x.bin"})
-    run_calibrate(tmp_path, board, record, [])
+    uncalibrated(tmp_path, board, record)
     rate = np.concatenate([np.zeros(4000), 50 * np.sin(np.arange(2000) / 50), np.zeros(4000)])
     columns = counts_of(board, rate)
     columns[board.gyros[0].field][1000] = 32767
@@ -179,7 +187,7 @@ def test_sinusoid_with_unknown_phase_and_logged_motion(tmp_path: Path, board: Bo
 def test_a_log_of_rates_is_not_calibrated(tmp_path: Path, board: Board):
     entry = {"name": "log", "kind": "static", "files": "x.parquet", "parquet": {"values": "rates"}}
     record = manifest(entry)
-    run_calibrate(tmp_path, board, record, [])
+    uncalibrated(tmp_path, board, record)
     columns = counts_of(board, np.zeros(300))
     for gyro in board.gyros:
         columns[gyro.field] = np.full(300, 1.25)
@@ -190,7 +198,7 @@ def test_a_log_of_rates_is_not_calibrated(tmp_path: Path, board: Board):
 
 def test_time_stamps_may_contradict_the_declared_rate(tmp_path: Path, board: Board):
     record = manifest({"name": "static", "kind": "static", "files": "x.bin"})
-    run_calibrate(tmp_path, board, record, [])
+    uncalibrated(tmp_path, board, record)
     for factor, expected in ((1.0, RATE_HZ), (1.01, RATE_HZ), (2.0, RATE_HZ / 2)):
         columns = counts_of(board, np.zeros(1000))
         columns["time"] = columns["time"] * factor + np.where(np.arange(1000) < 500, 0, 60)
@@ -200,7 +208,7 @@ def test_time_stamps_may_contradict_the_declared_rate(tmp_path: Path, board: Boa
 
 def test_empty_frames(tmp_path: Path, board: Board):
     record = manifest({"name": "static", "kind": "static", "files": "x.bin"})
-    run_calibrate(tmp_path, board, record, [])
+    uncalibrated(tmp_path, board, record)
     frames = write_frames(tmp_path / "frames", counts_of(board, np.empty(0)))
     rates = run_convert(tmp_path, board, record, "static", frames)
     assert len(rates["time"]) == 0

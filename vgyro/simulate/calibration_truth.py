@@ -67,12 +67,13 @@ def repeatability_truth(twin: Twin, board: Board, recordings: Sequence[str]) -> 
 def thermal_truth(twin: Twin, board: Board, recording: str) -> dict[str, dict[str, float]]:
     """Gyro → bias_temperature (deg/h/K) and self_heating (deg/h) of a recording.
 
-    Slope of the least-squares line through the bias over the temperatures of the recording, each second alike (NaN if
-    it does not change); bias once the self-heating has come to its end minus bias at the start.
+    Slope of the least-squares line through the bias over the temperatures that the recording meets, each degree alike
+    (NaN if it stays the same); bias once the self-heating has come to its end minus bias at the start.
     """
     spec = twin.recording(recording)
     thermal = temperature_of(twin, spec)
-    above = temperature_at(thermal, np.arange(0.5, spec.duration)) - thermal.reference_c
+    met = temperature_at(thermal, np.arange(0.5, spec.duration)) - thermal.reference_c
+    above = np.linspace(met.min(), met.max(), 1001)
     found = {}
     for gyro in board.gyros:
         truths = [truth_of(twin, spec, gyro.name)]

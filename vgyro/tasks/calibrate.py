@@ -1,146 +1,168 @@
-"""Calibrate: scale factor and bias of every gyro, from the rate-table recordings or, where there are none, nominal."""
+"""Calibrate: scale factor, bias and all other figures of every gyro, from the rate-table recordings, or nominal.
+
+Beside them the recordings at rest: thermal ones for the bias against temperature, static ones for the self-heating.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vgyro.board import Board, Gyro
+from vgyro.board import Board
 from vgyro.calibration import (
-    GyroNominal,
+    DIRECTION_NAMES,
+    Finding,
     ScaleFit,
-    average_plateaus,
-    find_plateaus,
-    fit_scale_factor,
+    figure_record,
     nominal_fit,
+    not_measured,
 )
-from vgyro.dataset import FileReference, Manifest, PlateauReference, Recording
-from vgyro.errors import TooShort
-from vgyro.storage.tables import read_columns, read_json, write_json
+from vgyro.calibration.figures import FIGURES
+from vgyro.config import CalibrationOptions
+from vgyro.dataset import FileReference, Manifest
+from vgyro.storage.tables import read_json, write_json
+from vgyro.tasks.block_means import thermometer_of
+from vgyro.tasks.calibrate_tables import Source, Test, cross_axes, fit_tests, nominal_of
+from vgyro.tasks.calibrate_thermal import Thermal, read_rests, temperature_record, thermal_of, worth_it
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.reference_log import read_reference
+from vgyro.units import earth_rate_deg_s
 
-
-@dataclass(frozen=True)
-class Source:
-    """A calibration recording, its frames, and its logged reference if it has one."""
-
-    recording: Recording
-    frames: Path
-    reference: Path | None
+KINDS = ("calibration", "thermal", "static")
+STANDARD = "IEEE Std 1431-2004"
+RULE = (
+    "scale, bias and points are those of the first usable calibration recording about each axis; the others are not "
+    "pooled, because the bias changes from one switch-on to the next: they give repeatability and temperature slopes"
+)
 
 
 def main(task: Task) -> None:
-    """inputs : frames, integrity (calibration recordings, in the manifest's order), references (those that have one)
+    """inputs : frames, integrity (of calibration, thermal and static recordings, in the manifest's order), references
 
-    outputs : calibration;  options : manifest, board
+    references : logged rates, of the calibration recordings that have one
+    outputs : calibration;  options : manifest, board, analysis.calibration
     """
     manifest = Manifest.model_validate(task.options["manifest"])
     board = Board.model_validate(task.options["board"])
+    options = CalibrationOptions.model_validate(task.options.get("analysis", {}).get("calibration", {}))
     sources, skipped = usable(task, manifest)
-    gyros: dict[str, Any] = {}
-    used: dict[str, str | None] = {}
-    for axis in board.axes:
-        name, fits, problems = calibrate_axis(sources, board, axis, manifest.latitude_deg)
-        used[axis] = name
-        skipped.update({problem: reason for problem, reason in problems.items() if problem not in skipped})
-        gyros.update({fit.gyro: record_of(fit, name) for fit in fits})
+    tables = [source for source in sources if source.recording.kind == "calibration"]
+    tests, problems = fit_tests(tables, board, manifest.latitude_deg, options)
+    known = {gyro.name: main_fit(gyro.name, tests, board) for gyro in board.gyros}
+    rests = read_rests(sources, board)
+    crossed = cross_axes(tests, board, {name: fit for name, (fit, _) in known.items()}, options)
+    gyros = {}
+    for gyro in board.gyros:
+        fit, recording = known[gyro.name]
+        thermal = thermal_of(gyro, board, fit, tests, rests, options)
+        thermometer = thermometer_of(board, gyro.name)
+        gyros[gyro.name] = {
+            **record_of(fit, recording),
+            "figures": figures_of(fit, thermal, crossed[gyro.name]),
+            "temperature": temperature_record(
+                thermal, thermometer.name if thermometer else None, options.temperature == "auto" and worth_it(thermal)
+            ),
+        }
+    used = {axis: next((test for test in tests if test.axis == axis), None) for axis in board.axes}
     record = {
         "dataset": task.options.get("dataset", ""),
-        "rule": "the first usable calibration recording about each axis; the others are not pooled, because the bias "
-        "changes from one switch-on to the next",
-        "recordings": used,
-        "skipped": skipped,
+        "rule": RULE,
+        "recordings": {axis: test.name if test else None for axis, test in used.items()},
+        "skipped": {**skipped, **problems},
         "earth_rate_removed": manifest.latitude_deg is not None and any(used.values()),
-        "gyros": {gyro.name: gyros[gyro.name] for gyro in board.gyros},
+        "test": {axis: test_record(axis, tests, manifest.latitude_deg) for axis, test in used.items() if test},
+        "gyros": gyros,
     }
     write_json(task.output("calibration"), record)
 
 
 def usable(task: Task, manifest: Manifest) -> tuple[list[Source], dict[str, str]]:
-    """Calibration recordings that decode did not refuse, and those left out with the reason."""
-    recordings = [recording for recording in manifest.recordings if recording.kind == "calibration"]
+    """Recordings that decode did not refuse and that hold counts, and those left out with the reason."""
+    recordings = [recording for recording in manifest.recordings if recording.kind in KINDS]
     logs = iter(task.inputs.get("references", []))
     sources, skipped = [], {}
     for recording, frames, integrity in zip(
         recordings, task.inputs.get("frames", []), task.inputs.get("integrity", []), strict=True
     ):
-        log = next(logs, None) if isinstance(recording.reference, FileReference) else None
+        log = None
+        if recording.kind == "calibration" and isinstance(recording.reference, FileReference):
+            log = next(logs, None)
         if read_json(integrity)["status"] == "refused":
-            skipped[recording.name] = "refused: see its integrity record"
+            reason = "refused: see its integrity record"
         elif recording.parquet is not None and recording.parquet.values == "rates":
-            skipped[recording.name] = "holds rates, not counts: nothing to calibrate"
+            reason = "holds rates, not counts: nothing to calibrate"
         else:
             sources.append(Source(recording, frames, log))
+            continue
+        if recording.kind == "calibration":
+            skipped[recording.name] = reason
     return sources, skipped
 
 
-def calibrate_axis(
-    sources: list[Source], board: Board, axis: str, latitude_deg: float | None
-) -> tuple[str | None, list[ScaleFit], dict[str, str]]:
-    """Fits of one axis' gyros from the first recording that allows it; else nominal."""
-    array = board.array(axis)
-    nominal = [GyroNominal(g.name, g.scale, g.bias, g.sign, g.range_deg_s) for g in array]
-    problems = {}
-    for source in sources:
-        if (source.recording.axis or board.axes[0]) != axis:
-            continue
-        try:
-            fits = fit_recording(source, board, array, nominal, latitude_deg)
-        except TooShort as error:
-            problems[source.recording.name] = error.what
-            continue
-        return source.recording.name, fits, problems
-    return None, [nominal_fit(gyro) for gyro in nominal], problems
+def main_fit(gyro: str, tests: list[Test], board: Board) -> tuple[ScaleFit, str | None]:
+    """The first fit in which the gyro was measured, and its recording; else nominal, with the reason."""
+    fits = [(fit, test.name) for test in tests for fit in test.fits if fit.gyro == gyro]
+    for fit, recording in fits:
+        if fit.source == "measured":
+            return fit, recording
+    if fits:
+        return fits[0][0], None
+    (nominal,) = nominal_of([one for one in board.gyros if one.name == gyro])
+    return nominal_fit(nominal), None
 
 
-def fit_recording(
-    source: Source, board: Board, array: list[Gyro], nominal: list[GyroNominal], latitude_deg: float | None
-) -> list[ScaleFit]:
-    """Fits from one recording.  raises : TooShort, DataError"""
-    fields = [gyro.field for gyro in array]
-    columns = read_columns(source.frames, ["time", *dict.fromkeys(fields)])
-    counts = np.column_stack([columns[name] for name in fields])
-    plateaus = list(plateaus_of(source))
-    rails = (board.adc.low, board.adc.high) if board.adc else None
-    means = average_plateaus(counts, columns["time"], plateaus, rails)
-    return fit_scale_factor(
-        means.rate, means.mean, means.standard_error, nominal, latitude_deg, where=source.recording.name
-    )
+def figures_of(fit: ScaleFit, thermal: Thermal, crossed: Finding) -> dict[str, Any]:
+    """Every figure of FIGURES, in its order, as JSON."""
+    known = {**fit.figures, **thermal.figures, "cross_axis": crossed}
+    missing = not_measured("no calibration recording that can be used")
+    return {name: figure_record(name, known.get(name, missing)) for name in FIGURES}
 
 
-def plateaus_of(source: Source) -> Iterator[tuple[float, float, float]]:
-    """(start s, stop s, rate deg/s): as the manifest lists them, or found in the logged reference."""
-    reference = source.recording.reference
-    if isinstance(reference, PlateauReference):
-        yield from ((plateau.start, plateau.stop, plateau.rate) for plateau in reference.plateaus)
-    elif isinstance(reference, FileReference) and source.reference is not None:
-        time, rate = read_reference(source.reference, reference)
-        yield from find_plateaus(rate, time)
+def test_record(axis: str, tests: list[Test], latitude_deg: float | None) -> dict[str, Any]:
+    """How the gyros of an axis were tested: rates and times of the first recording, temperatures of all."""
+    about = [test for test in tests if test.axis == axis]
+    means = about[0].means
+    celsius = np.concatenate([test.means.temperature.ravel() for test in about])
+    celsius = celsius[np.isfinite(celsius)]
+    turning = means.rate != 0
+    full_scale = [fit.full_scale for fit in about[0].fits if math.isfinite(fit.full_scale)]
+    return {
+        "recordings": [test.name for test in about],
+        "rates": int(np.unique(means.rate).size),
+        "full_scale": max(full_scale, default=float(np.abs(means.rate).max())),
+        "seconds_a_point": float(np.median(means.seconds)),
+        "whole_turns": bool(turning.any() and (means.turns[turning] > 0).all()),
+        "earth_rate_deg_s": None if latitude_deg is None else earth_rate_deg_s(latitude_deg),
+        "temperature_c": [float(celsius.min()), float(celsius.max())] if celsius.size else None,
+        "standard": STANDARD,
+    }
 
 
 def record_of(fit: ScaleFit, recording: str | None) -> dict[str, Any]:
     """JSON of one gyro. Scale deg/s a count, bias counts, residual deg/s; null where there is no figure."""
+    numbers = (
+        "scale", "scale_low", "scale_high", "bias", "bias_low", "bias_high", "nonlinearity_ppm", "floor_ppm",
+    )  # fmt: skip
+    columns = (fit.rate, fit.mean_count, fit.residual, fit.standard_error, fit.direction, fit.temperature)
     return {
         "source": fit.source,
-        "recording": recording if fit.source == "measured" else None,
-        **{
-            name: _number(getattr(fit, name))
-            for name in (
-                "scale", "scale_low", "scale_high", "bias", "bias_low", "bias_high", "nonlinearity_ppm", "floor_ppm",
-            )
-        },
+        "recording": recording,
+        **{name: _number(getattr(fit, name)) for name in numbers},
         "points": [
-            {"rate": float(rate), "mean_count": float(count), "residual_deg_s": float(residual)}
-            for rate, count, residual in zip(fit.rate, fit.mean_count, fit.residual, strict=True)
+            {
+                "rate": float(rate),
+                "mean_count": float(count),
+                "residual_deg_s": float(residual),
+                "recording": recording,
+                "direction": DIRECTION_NAMES[int(direction)],
+                "temperature_c": _number(celsius),
+                "standard_error_deg_s": _number(error),
+            }
+            for rate, count, residual, error, direction, celsius in zip(*columns, strict=True)
         ],
         "note": fit.note,
-    }  # fmt: skip
+    }
 
 
 def _number(value: float) -> float | None:

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 
-from vgyro.board import Board
-from vgyro.calibration import clipped_samples, find_rest, fit_phase, sinusoid, to_rates
+from vgyro.board import Board, Gyro
+from vgyro.calibration import (
+    Compensation,
+    clipped_samples,
+    compensate,
+    find_rest,
+    fit_phase,
+    sinusoid,
+    smooth_temperature,
+    to_rates,
+)
 from vgyro.config import RestOptions
 from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, Recording, SinusoidReference
 from vgyro.storage.tables import TableWriter, read_batches, read_json
+from vgyro.tasks.block_means import block_means, whole_column
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.reference_log import read_reference
 
@@ -31,9 +42,10 @@ def main(task: Task) -> None:
     board = Board.model_validate(task.options["board"])
     recording = manifest.recording(task.options["recording"])
     frames = task.input("frames")
-    converter = Converter(board, recording, read_json(task.input("calibration"))["gyros"])
     time = whole_column(frames, "time")
     rate_hz = sample_rate(recording, board, time)
+    converter = Converter(board, recording, read_json(task.input("calibration"))["gyros"])
+    converter.read_temperatures(frames, rate_hz)
     options = RestOptions.model_validate(task.options["analysis"].get("rest", {}))
     clipped = converter.clipped(frames)
     at_rest = rest_of(converter, frames, time, rate_hz, options)
@@ -48,6 +60,7 @@ def main(task: Task) -> None:
         "calibration": {
             name: "rates as logged" if converter.rates else row["source"] for name, row in converter.gyros.items()
         },
+        "temperature": {gyro.name: converter.compensation_record(gyro) for gyro in board.gyros},
     }
     if reference is not None:
         extra["reference_axis"] = recording.axis or board.axes[0]
@@ -75,16 +88,57 @@ class Converter:
         self.rates = recording.parquet is not None and recording.parquet.values == "rates"
         fields = [*(gyro.field for gyro in board.gyros), *(temperature.field for temperature in board.temperatures)]
         self.columns = ["time", "segment", *dict.fromkeys(fields)]
+        self.compensations = {} if self.rates else compensations_of(self.gyros)
+        self._celsius: dict[str, tuple[np.ndarray, np.ndarray]] = {}  # sensor: time, smoothed °C
 
-    def rates_of(self, raw: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Gyro → deg/s along its axis; a log of rates is only turned the right way round."""
+    def read_temperatures(self, frames: Path, rate_hz: float) -> None:
+        """Smooth the thermometers that are needed: means of a second, then as the calibration does."""
+        sensors = {self.gyros[name]["temperature"]["sensor"] for name in self.compensations}
+        used = [thermometer for thermometer in self.board.temperatures if thermometer.name in sensors]
+        if not used:
+            return
+        means = block_means(frames, [thermometer.field for thermometer in used], max(1.0, 1.0 / rate_hz))
+        if means.time.size == 0:
+            self.compensations = {}
+            return
+        for thermometer in used:
+            celsius = means.values[thermometer.field] * thermometer.scale + thermometer.offset
+            smooth = smooth_temperature(celsius, 1.0 / means.seconds, segment=means.segment)
+            self._celsius[thermometer.name] = means.time, smooth
+
+    def rates_of(self, raw: dict[str, np.ndarray], gyros: Sequence[Gyro] | None = None) -> dict[str, np.ndarray]:
+        """Gyro → deg/s along its axis, of all or of some; a log of rates is only turned the right way round."""
+        chosen = self.board.gyros if gyros is None else gyros
         if self.rates:
-            return {gyro.name: gyro.sign * raw[gyro.field].astype(float) for gyro in self.board.gyros}
+            return {gyro.name: gyro.sign * raw[gyro.field].astype(float) for gyro in chosen}
+        return {gyro.name: self._rate_of(gyro, raw) for gyro in chosen}
+
+    def _rate_of(self, gyro: Gyro, raw: dict[str, np.ndarray]) -> np.ndarray:
+        row = self.gyros[gyro.name]
+        if gyro.name not in self.compensations:
+            return to_rates(raw[gyro.field], gyro.sign, row["scale"], row["bias"])
+        celsius = np.interp(raw["time"], *self._celsius[row["temperature"]["sensor"]])
+        return compensate(raw[gyro.field], celsius, gyro.sign, row["scale"], self.compensations[gyro.name])
+
+    def compensation_record(self, gyro: Gyro) -> dict[str, Any]:
+        """What was done about the temperature of one gyro, for the metadata.
+
+        in_sample : the compensation was found on this very recording, so what is left of the dependence is flattered
+        outside   : share of the time outside the temperatures of the calibration, where its ends are held
+        """
+        record = self.gyros[gyro.name].get("temperature")
+        if gyro.name not in self.compensations:
+            return {"applied": False, "note": "rates as logged" if self.rates else "no temperature compensation"}
+        celsius = self._celsius[record["sensor"]][1]
+        low, high = record["low_c"], record["high_c"]
+        in_sample = self.recording.name in record["recordings"]
+        note = f"bias and scale compensated by {record['sensor']}, {low:.1f} to {high:.1f} °C"
         return {
-            gyro.name: to_rates(
-                raw[gyro.field], gyro.sign, self.gyros[gyro.name]["scale"], self.gyros[gyro.name]["bias"]
-            )
-            for gyro in self.board.gyros
+            "applied": True,
+            "sensor": record["sensor"],
+            "in_sample": in_sample,
+            "outside": float(np.mean((celsius < low) | (celsius > high))),
+            "note": f"{note}; in-sample: found on this recording" if in_sample else note,
         }
 
     def temperatures(self, raw: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -100,32 +154,30 @@ class Converter:
 
     def array(self, frames: Path, names: list[str]) -> np.ndarray:
         """Rates [T, n] of some gyros, in single precision."""
-        chosen = Converter(
-            self.board.model_copy(update={"gyros": tuple(g for g in self.board.gyros if g.name in names)}),
-            self.recording,
-            self.gyros,
-        )
-        fields = [*dict.fromkeys(gyro.field for gyro in chosen.board.gyros)]
-        rates = np.empty((pq.read_metadata(frames).num_rows, len(chosen.board.gyros)), dtype=np.float32)
+        gyros = [gyro for gyro in self.board.gyros if gyro.name in names]
+        rates = np.empty((pq.read_metadata(frames).num_rows, len(gyros)), dtype=np.float32)
         first = 0
-        for raw in read_batches(frames, fields):
-            stop = first + len(raw[fields[0]])
-            for index, rate in enumerate(chosen.rates_of(raw).values()):
-                rates[first:stop, index] = rate
+        for raw in read_batches(frames, ["time", *dict.fromkeys(gyro.field for gyro in gyros)]):
+            stop = first + len(raw["time"])
+            found = self.rates_of(raw, gyros)
+            for index, gyro in enumerate(gyros):
+                rates[first:stop, index] = found[gyro.name]
             first = stop
         return rates
 
 
-def whole_column(frames: Path, name: str) -> np.ndarray:
-    """One column of numbers of a table, read row group by row group: little more memory than it takes itself."""
-    kind = pq.read_schema(frames).field(name).type.to_pandas_dtype()
-    values = np.empty(pq.read_metadata(frames).num_rows, dtype=kind)
-    first = 0
-    for batch in read_batches(frames, [name]):
-        stop = first + len(batch[name])
-        values[first:stop] = batch[name]
-        first = stop
-    return values
+def compensations_of(calibration: dict[str, Any]) -> dict[str, Compensation]:
+    """Gyro → what the calibration says is to be taken off."""
+    found = {}
+    for name, row in calibration.items():
+        known = row.get("temperature")
+        if known and known["applied"]:
+            constant, first, second, third = known["bias"]
+            found[name] = Compensation(
+                known["reference_c"], known["low_c"], known["high_c"], known["scale_slope"],
+                (constant, first, second, third),
+            )  # fmt: skip
+    return found
 
 
 def sample_rate(recording: Recording, board: Board, time: np.ndarray) -> float:

@@ -1,5 +1,5 @@
 rule calibrate:
-    """Scale factor and bias of every gyro, from the rate-table recordings; nominal where there are none."""
+    """Every figure of a calibration, from the recordings on a rate table and at rest; nominal where there are none."""
     input:
         frames=calibration_frames,
         integrity=calibration_integrity,
@@ -14,7 +14,7 @@ rule calibrate:
         mem_mb=2000,
         runtime=20,
     params:
-        options=stage("manifest", "board"),
+        options=stage("manifest", "board", "calibration"),
         code=code("calibrate"),
     shell:
         "python -m vgyro.tasks.calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"

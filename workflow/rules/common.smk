@@ -228,6 +228,13 @@ def dcc_of(wildcards):
     return tables_of(wildcards, "dcc")
 
 
+def level_garch(wildcards):
+    """GARCH fits of the level, where it is analysed."""
+    folder = f"results/{wildcards.dataset}/{wildcards.recording}/{wildcards.axis}"
+    there = "level" in definitions(wildcards.dataset)
+    return [f"{folder}/level/garch.parquet"] if there else []
+
+
 def all_integrity(wildcards):
     """Integrity record of every recording of a data set."""
     return [
@@ -243,15 +250,15 @@ def all_noise(wildcards):
 
 
 def calibration_frames(wildcards):
-    """Frames of the calibration recordings."""
+    """Frames of the recordings that calibrate uses: on a rate table, and at rest."""
     return [
         f"results/{wildcards.dataset}/{name}/frames.parquet"
-        for name in recordings(wildcards.dataset, "calibration")
+        for name in recordings(wildcards.dataset, "calibration", *AT_REST)
     ]
 
 
 def calibration_integrity(wildcards):
-    """Integrity records of the calibration recordings."""
+    """Integrity records of the recordings that calibrate uses."""
     return [
         path.replace("frames.parquet", "integrity.json")
         for path in calibration_frames(wildcards)
