@@ -1,21 +1,49 @@
 """Scale factor, bias, conversion to deg/s, and where the board stands still. Pure functions of arrays."""
 
 from vgyro.calibration.convert import clipped_samples, fit_phase, sinusoid, to_rates
-from vgyro.calibration.plateaus import PlateauMeans, average_plateaus, find_plateaus
+from vgyro.calibration.figures import Finding, figure_record, not_measured
+from vgyro.calibration.plateaus import DIRECTION_NAMES, PlateauMeans, average_plateaus, find_plateaus
+from vgyro.calibration.repeatability import bias_repeatability, scale_repeatability
 from vgyro.calibration.rest import find_rest
-from vgyro.calibration.scale import GyroNominal, ScaleFit, fit_scale_factor, nominal_fit
+from vgyro.calibration.scale import GyroNominal, ScaleFit, cross_axis, fit_scale_factor, nominal_fit
+from vgyro.calibration.temperature import Compensation, compensate, scale_temperature, smooth_temperature
+from vgyro.calibration.thermal import (
+    BiasTemperature,
+    ThermalPoints,
+    bias_temperature,
+    fit_bias_temperature,
+    self_heating,
+    thermal_points,
+)
 
 __all__ = [
+    "DIRECTION_NAMES",
+    "BiasTemperature",
+    "Compensation",
+    "Finding",
     "GyroNominal",
     "PlateauMeans",
     "ScaleFit",
+    "ThermalPoints",
     "average_plateaus",
+    "bias_repeatability",
+    "bias_temperature",
     "clipped_samples",
+    "compensate",
+    "cross_axis",
+    "figure_record",
     "find_plateaus",
     "find_rest",
+    "fit_bias_temperature",
     "fit_phase",
     "fit_scale_factor",
     "nominal_fit",
+    "not_measured",
+    "scale_repeatability",
+    "scale_temperature",
+    "self_heating",
     "sinusoid",
+    "smooth_temperature",
+    "thermal_points",
     "to_rates",
 ]

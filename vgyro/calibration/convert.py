@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 
-def to_rates(counts: np.ndarray, sign: int, scale: float, bias: float) -> np.ndarray:
+def to_rates(counts: np.ndarray, sign: int, scale: float | np.ndarray, bias: float | np.ndarray) -> np.ndarray:
     """Rate of one gyro, deg/s: sign · (count - bias) · scale.
 
-    counts : array [T];  scale : deg/s a count;  bias : counts
+    counts : array [T];  scale : deg/s a count;  bias : counts; numbers, or arrays [T] that follow the temperature
     """
     return (np.asarray(counts, dtype=float) - bias) * (sign * scale)
 

@@ -8,16 +8,30 @@ import numpy as np
 
 BATCHES = 20
 FEWEST_BATCHES = 4
+TURN = 360.0
+DIRECTION_NAMES = {1: "up", -1: "down", 0: "none"}
 
 
 @dataclass(frozen=True)
 class PlateauMeans:
-    """rate [P] deg/s; mean, standard_error [P, N] counts (NaN where clipped or empty); samples [P]"""
+    """What a test on a rate table gives: P plateaus, N gyros.
+
+    rate [P] deg/s; mean, standard_error [P, N] counts (NaN where clipped or empty); samples [P]
+    time [P]      : middle of the average, s;  seconds [P] : its length
+    turns [P]     : whole turns of the table that were averaged; 0: the plateau holds less than one
+    direction [P] : 1 reached from a lower rate, -1 from a higher one, 0 the first, or the rate of the one before
+    temperature [P, N] : mean, °C; NaN without a thermometer
+    """
 
     rate: np.ndarray
     mean: np.ndarray
     standard_error: np.ndarray
     samples: np.ndarray
+    time: np.ndarray
+    seconds: np.ndarray
+    turns: np.ndarray
+    direction: np.ndarray
+    temperature: np.ndarray
 
 
 def find_plateaus(
@@ -72,30 +86,53 @@ def average_plateaus(
     time: np.ndarray,
     plateaus: list[tuple[float, float, float]],
     rails: tuple[float, float] | None = None,
+    *,
+    whole_turns: bool = True,
+    temperature: np.ndarray | None = None,
 ) -> PlateauMeans:
     """Mean count of every gyro on every plateau, and its standard error by batch means.
 
-    counts   : array [T, N];  time : array [T], s
-    plateaus : (start, stop, rate) each, the settling already left out
-    rails    : counts at which the converter clips; a plateau with a clipped sample is NaN for that gyro
-    returns  : PlateauMeans. Standard error: the plateau is cut into 20 batches (fewer where it is short) and the spread
-               of their means is taken, so that slow noise counts.
+    counts      : array [T, N];  time : array [T], s
+    plateaus    : (start, stop, rate) each, in order of time, the settling already left out
+    rails       : counts at which the converter clips; a plateau with a clipped sample is NaN for that gyro
+    whole_turns : average whole turns of the table where a plateau holds one (360°/|rate|), so that the horizontal part
+                  of the Earth rate, gravity and the wobble of the table cancel; the end of the plateau is left out
+    temperature : °C, [T] of one thermometer or [T, N] of one for each gyro
+    returns     : PlateauMeans. Standard error: the average is cut into 20 batches (fewer where it is short) and the
+                  spread of their means is taken, so that noise slower than a sample counts.
     """
     number = counts.shape[1]
     shape = (len(plateaus), number)
-    mean, error, samples = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(len(plateaus), dtype=np.int64)
-    for row, (start, stop, _) in enumerate(plateaus):
-        first, last = np.searchsorted(time, start, side="left"), np.searchsorted(time, stop, side="right")
+    mean, error, warmth = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
+    samples = np.zeros(len(plateaus), dtype=np.int64)
+    starts, stops, rate = (np.array([plateau[k] for plateau in plateaus], dtype=float) for k in range(3))
+    turns = np.floor((stops - starts) * np.abs(rate) / TURN + 1e-9).astype(np.int64) if whole_turns else samples.copy()
+    turned = turns > 0
+    stops[turned] = starts[turned] + turns[turned] * TURN / np.abs(rate[turned])
+    for row, (start, stop) in enumerate(zip(starts, stops, strict=True)):
+        first = np.searchsorted(time, start, side="left")
+        # The sample at the end of a whole turn is the first one of the next turn.
+        last = np.searchsorted(time, stop - 1e-9 if turned[row] else stop, side="left" if turned[row] else "right")
         part = np.asarray(counts[first:last], dtype=float)
         samples[row] = len(part)
         if len(part) < FEWEST_BATCHES:
             continue
         mean[row] = part.mean(axis=0)
-        length = max(len(part) // BATCHES, 1)
-        batches = len(part) // length
-        means = part[: batches * length].reshape(batches, length, number).mean(axis=1)
-        error[row] = means.std(axis=0, ddof=1) / np.sqrt(batches)
+        error[row] = _batch_error(part)
+        if temperature is not None:
+            warmth[row] = np.mean(temperature[first:last], axis=0)
         if rails is not None:
             clipped = (part <= rails[0]).any(axis=0) | (part >= rails[1]).any(axis=0)
             mean[row, clipped] = error[row, clipped] = np.nan
-    return PlateauMeans(np.array([rate for _, _, rate in plateaus]), mean, error, samples)
+    direction = np.sign(np.diff(rate, prepend=rate[:1])).astype(np.int8)
+    return PlateauMeans(
+        rate, mean, error, samples, (starts + stops) / 2, stops - starts, turns, direction, warmth
+    )  # fmt: skip
+
+
+def _batch_error(part: np.ndarray) -> np.ndarray:
+    """Standard error of the mean of part [T, N] by batch means."""
+    length = max(len(part) // BATCHES, 1)
+    batches = len(part) // length
+    means = part[: batches * length].reshape(batches, length, part.shape[1]).mean(axis=1)
+    return means.std(axis=0, ddof=1) / np.sqrt(batches)

@@ -1,4 +1,4 @@
-"""Scale factor and bias of each gyro from rate-table plateaus, with intervals and the floor of the test."""
+"""Scale factor, bias and the other figures of each gyro from rate-table plateaus, with intervals and floors."""
 
 from __future__ import annotations
 
@@ -8,11 +8,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vgyro import units
+from vgyro.calibration.figures import BELOW, Finding, not_measured
+from vgyro.calibration.linearity import asymmetry, combined, hysteresis, nonlinearity, zero_shift
+from vgyro.calibration.plateaus import PlateauMeans
+from vgyro.calibration.response import Response, Visits, fit_response, same_rates
 from vgyro.errors import DataError, TooShort
 
-FEWEST_PLATEAUS = 3
+FEWEST_RATES = 3
 NO_RESPONSE = 0.1  # of the nominal slope
 FAR_FROM_NOMINAL = 0.2
+UNEXPLAINED = 2.0
+PERCENT = 100.0
 
 
 @dataclass(frozen=True)
@@ -30,10 +36,14 @@ class GyroNominal:
 class ScaleFit:
     """Calibration of one gyro: rate = sign · (count - bias) · scale.
 
-    source        : "measured" or "nominal"
-    scale, low, high deg/s a count; bias, low, high counts; NaN limits where nominal
-    nonlinearity_ppm : largest |residual| over full scale;  floor_ppm : what a perfectly linear gyro would show
-    rate, mean_count, residual [P] : the points of the fit, deg/s, counts, deg/s (output - table)
+    source           : "measured" or "nominal"
+    scale, low, high deg/s a count; bias, low, high counts; scale_error, bias_error standard errors; NaN where nominal
+    nonlinearity_ppm : largest |residual| over full scale as seen, visits of one rate averaged, noise not taken off
+    floor_ppm        : what a perfectly linear gyro would show, median
+    figures          : the findings of this test by the names of figures.FIGURES; empty where nominal
+    full_scale deg/s; temperature_c mean of the test, NaN without a thermometer
+    rate, mean_count, residual, standard_error, direction, temperature [P] : the points of the fit; deg/s, counts, deg/s
+                       (output - table), deg/s, 1 up -1 down 0 none, °C
     """
 
     gyro: str
@@ -50,6 +60,14 @@ class ScaleFit:
     mean_count: np.ndarray = field(default_factory=lambda: np.empty(0))
     residual: np.ndarray = field(default_factory=lambda: np.empty(0))
     note: str = ""
+    scale_error: float = math.nan
+    bias_error: float = math.nan
+    full_scale: float = math.nan
+    temperature_c: float = math.nan
+    figures: dict[str, Finding] = field(default_factory=dict)
+    standard_error: np.ndarray = field(default_factory=lambda: np.empty(0))
+    direction: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int8))
+    temperature: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
 def nominal_fit(gyro: GyroNominal, note: str = "nominal scale: no calibration recording") -> ScaleFit:
@@ -59,9 +77,7 @@ def nominal_fit(gyro: GyroNominal, note: str = "nominal scale: no calibration re
 
 
 def fit_scale_factor(
-    rate: np.ndarray,
-    mean_count: np.ndarray,
-    standard_error: np.ndarray,
+    means: PlateauMeans,
     gyros: list[GyroNominal],
     latitude_deg: float | None = None,
     confidence: float = 0.95,
@@ -69,95 +85,110 @@ def fit_scale_factor(
 ) -> list[ScaleFit]:
     """Least-squares line count = bias + slope · rate through the plateaus of each gyro; scale = sign / slope.
 
-    rate           : array [P], deg/s, of the table about the gyros' axis
-    mean_count     : array [P, N]; NaN where a plateau cannot be used for a gyro (clipped)
-    standard_error : array [P, N], counts, of the plateau means
-    gyros          : N nominal values, whose sign says which way each gyro is mounted
-    latitude_deg   : given: the axis is taken as vertical, upwards, and 15.04 deg/h · sin(latitude) is added to the
-                     table's rate, so that it does not end up in the bias
-    where          : the recording, for messages
-    returns        : N ScaleFit. Limits from the t distribution with P - 2 degrees of freedom. A gyro that does not
-                     answer to the table (below a tenth of its nominal slope) keeps its nominal values, and says so.
-                     floor_ppm: median of the largest |residual| that the standard errors alone produce.
-    raises         : TooShort with fewer than 3 plateaus; DataError if a gyro turns against its sign
-    IEEE Std 1431-2004, scale factor and nonlinearity; Liu et al. (2015), fig. 2.
+    means        : of a table about the gyros' axis; NaN where a plateau cannot be used for a gyro (clipped)
+    gyros        : N nominal values, whose sign says which way each gyro is mounted
+    latitude_deg : given: the axis is taken as vertical, upwards, and 15.04 deg/h · sin(latitude) is added to the
+                   table's rate, so that it does not end up in the bias
+    where        : the recording, for messages
+    returns      : N ScaleFit. Intervals from the scatter of the plateaus about the model of `response`, whose bias may
+                   drift in time and whose errors may wander (bias instability, random walk). The bias is the mean of
+                   the test. A gyro that does not answer to the table (below a tenth of its nominal slope) keeps its
+                   nominal values, and says so.
+    raises       : TooShort with fewer than 3 rates; DataError if a gyro turns against its sign
+    IEEE Std 1431-2004, scale factor, nonlinearity, asymmetry, hysteresis; Liu et al. (2015), fig. 2.
     """
-    rate = np.asarray(rate, dtype=float)
-    if np.unique(rate).size < FEWEST_PLATEAUS:
+    rates, _ = same_rates(means.rate)
+    if rates.size < FEWEST_RATES:
         raise TooShort(
-            f"{np.unique(rate).size} different rates on the table",
-            where,
-            "A line with its nonlinearity needs 3 or more",
+            f"{rates.size} different rates on the table", where, "A line with its nonlinearity needs 3 or more"
         )
-    if latitude_deg is not None:
-        rate = rate + units.earth_rate_deg_s(latitude_deg)
+    earth = 0.0 if latitude_deg is None else units.earth_rate_deg_s(latitude_deg)
     fits = []
     for column, gyro in enumerate(gyros):
-        usable = np.isfinite(mean_count[:, column])
-        if np.unique(rate[usable]).size < FEWEST_PLATEAUS:
+        response = _respond(means, column)
+        if response is None:
             fits.append(nominal_fit(gyro, "nominal scale: fewer than 3 plateaus without clipped samples"))
             continue
-        fits.append(
-            _fit_one(rate[usable], mean_count[usable, column], standard_error[usable, column], gyro, confidence, where)
-        )
+        relative = float(response.slope @ response.fit.estimate) * gyro.sign * gyro.scale
+        if abs(relative) < NO_RESPONSE:
+            words = f"nominal scale: the gyro does not answer to the table ({relative:.1%} of nominal)"
+            fits.append(nominal_fit(gyro, words))
+        elif relative < 0:
+            remedy = f"Set its sign to {-gyro.sign} in the board file"
+            raise DataError(f"gyro {gyro.name!r} turns against the table", where, remedy)
+        else:
+            fits.append(_scale_fit(response, means, column, gyro, earth, confidence))
     return fits
 
 
-def _fit_one(
-    rate: np.ndarray, count: np.ndarray, error: np.ndarray, gyro: GyroNominal, confidence: float, where: str | None
-) -> ScaleFit:
-    from scipy.special import stdtrit
+def cross_axis(means: PlateauMeans, gyros: list[GyroNominal], confidence: float = 0.95) -> list[Finding]:
+    """Response of gyros of other axes to this table, % of a rotation about their own axis; one a gyro.
 
-    points = len(rate)
-    centre = rate.mean()
-    spread = float(np.sum((rate - centre) ** 2))
-    slope = float((rate - centre) @ count) / spread
-    relative = slope * gyro.sign * gyro.scale
-    if abs(relative) < NO_RESPONSE:
-        return nominal_fit(gyro, f"nominal scale: the gyro does not answer to the table ({relative:.1%} of nominal)")
-    if relative < 0:
-        raise DataError(
-            f"gyro {gyro.name!r} turns against the table", where, f"Set its sign to {-gyro.sign} in the board file"
-        )
-    bias = float(count.mean()) - slope * centre
-    left = count - bias - slope * rate
-    scatter = math.sqrt(float(left @ left) / (points - 2))
-    quantile = float(stdtrit(points - 2, 0.5 + confidence / 2))
-    slope_half = quantile * scatter / math.sqrt(spread)
-    bias_half = quantile * scatter * math.sqrt(1 / points + centre**2 / spread)
+    means : [P, N] of those gyros;  gyros : their scale, measured where there is one, and sign
+    """
+    findings = []
+    for column, gyro in enumerate(gyros):
+        response = _respond(means, column)
+        if response is None:
+            findings.append(not_measured("fewer than 3 plateaus without clipped samples"))
+            continue
+        percent = gyro.sign * gyro.scale * PERCENT
+        findings.append(combined(response, response.slope * percent, confidence))
+    return findings
+
+
+def _respond(means: PlateauMeans, column: int) -> Response | None:
+    usable = np.isfinite(means.mean[:, column])
+    rate, count = means.rate[usable], means.mean[usable, column]
+    if same_rates(rate)[0].size < FEWEST_RATES:
+        return None
+    return fit_response(Visits(rate, count, means.seconds[usable], means.time[usable], means.direction[usable]))
+
+
+def _scale_fit(
+    response: Response, means: PlateauMeans, column: int, gyro: GyroNominal, earth: float, confidence: float
+) -> ScaleFit:
+    fit, visits, usable = response.fit, response.model.visits, np.isfinite(means.mean[:, column])
+    slope = float(response.slope @ fit.estimate)
+    slope_half = fit.half_width(response.slope, confidence)
+    # The table's zero is the Earth's rate for the gyro.
+    at_rest = response.bias - earth * response.slope
+    bias, bias_half = float(at_rest @ fit.estimate), fit.half_width(at_rest, confidence)
     scale = gyro.sign / slope
     ends = sorted(gyro.sign / (slope + side * slope_half) for side in (-1, 1))
-    residual = gyro.sign * left * scale
-    full_scale = gyro.range_deg_s or float(np.max(np.abs(rate)))
-    nonlinearity = float(units.parts_per_million(float(np.max(np.abs(residual))) / full_scale))
-    floor = float(units.parts_per_million(_largest_of_noise(error * scale) / full_scale))
+    full_scale = gyro.range_deg_s or visits.largest
+    figures = {
+        **nonlinearity(response, scale, full_scale, confidence),
+        "asymmetry": asymmetry(response, confidence),
+        "hysteresis": hysteresis(response, scale, full_scale, confidence),
+        "zero_shift": zero_shift(response, gyro.sign * scale, confidence),
+    }
+    seen = np.abs(response.seen_bend @ visits.count).max() * scale / full_scale
+    error = means.standard_error[usable, column] * scale
+    warmth = means.temperature[usable, column]
+    floor = figures["nonlinearity_full_scale"].floor
     return ScaleFit(
         gyro.name, "measured", scale, ends[0], ends[1], bias, bias - bias_half, bias + bias_half,
-        nonlinearity, floor, rate, count, residual, _note(nonlinearity, floor, relative, full_scale),
+        float(units.parts_per_million(seen)), floor, visits.rate, visits.count,
+        gyro.sign * scale * (visits.count - bias) - visits.rate - earth,
+        _note(response, scale, gyro, full_scale, error, figures["nonlinearity_full_scale"]),
+        fit.standard_error(response.slope) / slope**2, fit.standard_error(at_rest), full_scale, float(np.mean(warmth)),
+        figures, error, visits.direction, warmth,
     )  # fmt: skip
 
 
-def _largest_of_noise(error: np.ndarray) -> float:
-    """Median of the largest of |x_p|, x_p normal with standard deviations `error` [P]."""
-    from scipy.special import log_ndtr, ndtr
-
-    if not np.any(error > 0):
-        return 0.0
-    spread = error[error > 0]
-    low, high = 0.0, 10 * float(spread.max())
-    for _ in range(60):
-        middle = (low + high) / 2
-        # P(|x| < m) = 1 - 2 P(x > m); the product over the plateaus as a sum of logarithms
-        tails = ndtr(-middle / spread)
-        inside = np.sum(np.where(tails < 0.4, np.log1p(-2 * np.minimum(tails, 0.4)), log_ndtr(-np.inf)))
-        low, high = (low, middle) if inside > math.log(0.5) else (middle, high)
-    return (low + high) / 2
-
-
-def _note(nonlinearity: float, floor: float, relative: float, full_scale: float) -> str:
+def _note(
+    response: Response, scale: float, gyro: GyroNominal, full_scale: float, error: np.ndarray, bend: Finding
+) -> str:
     notes = [f"full scale {full_scale:g} deg/s"]
-    if nonlinearity <= 1.5 * floor:
-        notes.append("the nonlinearity is at the floor of this test")
-    if abs(1 / relative - 1) > FAR_FROM_NOMINAL:
-        notes.append(f"the scale is {1 / relative:.2f} times the nominal one")
+    if bend.state == BELOW:
+        notes.append("the nonlinearity is below the floor of this test")
+    if abs(scale / gyro.scale - 1) > FAR_FROM_NOMINAL:
+        notes.append(f"the scale is {scale / gyro.scale:.2f} times the nominal one")
+    if not response.drifts:
+        notes.append("no drift in time taken off: too few plateaus, or in the order of their rates")
+    within = float(np.sqrt(np.mean(error**2)))
+    between = float(np.sqrt(np.mean(np.diag(response.fit.noise)))) * scale
+    if within > 0 and between > UNEXPLAINED * within:
+        notes.append(f"the plateaus scatter {between / within:.1f} times more than the noise within them explains")
     return "; ".join(notes)

@@ -1,0 +1,63 @@
+"""The largest, or the r.m.s., of noisy numbers: what noise adds to it, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+DRAWS = 2000
+SEED = 1431
+BISECTIONS = 40
+
+Size = Callable[[np.ndarray], np.ndarray]  # [..., J] → [...]: a norm
+
+
+def largest(values: np.ndarray) -> np.ndarray:
+    """Largest |value| along the last axis."""
+    return np.abs(values).max(axis=-1)
+
+
+def root_mean_square(values: np.ndarray) -> np.ndarray:
+    """Root of the mean square along the last axis."""
+    return np.sqrt(np.mean(values**2, axis=-1))
+
+
+def noise_draws(covariance: np.ndarray) -> np.ndarray:
+    """Draws [2000, J] of normal noise."""
+    generator = np.random.default_rng(SEED)
+    power, axes = np.linalg.eigh((covariance + covariance.T) / 2)
+    return generator.standard_normal((DRAWS, len(power))) @ (axes * np.sqrt(np.maximum(power, 0))).T
+
+
+def size_and_limits(
+    estimate: np.ndarray, noise: np.ndarray, size: Size, confidence: float
+) -> tuple[float, float, float]:
+    """Size of a vector that is known with errors: median-unbiased value, lower and upper limit.
+
+    estimate : [J];  noise : draws [n, J] of its errors
+    size(estimate) is biased upward by the errors. So the test is inverted: for a true vector a·u, u of size 1 along the
+    estimate, size(a·u + noise) is below the size seen with a probability that falls with a; the value is the a of
+    probability one half, the limits those of (1 ± confidence) / 2. Where noise alone (a = 0) shows that size often
+    enough the limit, or the value, is 0; that is exact, whatever u is. For the upper limit the probability is that over
+    the one at a = 0 (CLs; Read 2002, J. Phys. G 28, 2693): a size that is small by chance proves no more than the test
+    can see.
+    """
+    seen = float(size(estimate))
+    if seen <= 0:
+        return 0.0, 0.0, float(np.quantile(size(noise), confidence))
+    unit = estimate / seen
+    top = seen + float(size(noise).max())
+
+    by_noise = float(np.mean(size(noise) <= seen))
+
+    def true_size(below: float) -> float:
+        low, high = 0.0, top
+        if by_noise <= below:
+            return 0.0
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if np.mean(size(middle * unit + noise) <= seen) > below else (low, middle)
+        return (low + high) / 2
+
+    return true_size(0.5), true_size((1 + confidence) / 2), true_size((1 - confidence) / 2 * by_noise)
