@@ -52,3 +52,11 @@ def test_slots_within_a_segment_must_rise():
 def test_no_samples():
     found = Sampling.of(10.0, np.empty(0, int), np.empty(0, int))
     assert (len(found), found.missing, len(found.segment)) == (0, 0, 0)
+    assert [part.tolist() for part in found.slots()] == [[], [0]]
+
+
+def test_slots_leave_out_what_lay_between_two_stretches():
+    found = Sampling.of(10.0, np.array([0, 0, 1, 2, 2]), np.array([5, 6, 9, 400, 401]))
+    slot, edges = found.slots()
+    np.testing.assert_array_equal(slot, [0, 1, 4, 5, 6])
+    np.testing.assert_array_equal(edges, [0, 5, 7])

@@ -77,7 +77,7 @@ class Sampling:
         The last of the edges is one past the last slot; what lay between two stretches is left out.
         """
         first = np.flatnonzero(np.diff(self.stretch, prepend=self.stretch[:1] - 1))
-        last = np.append(first[1:], len(self)) - 1
+        last = np.append(first, len(self))[1:] - 1
         edges = np.concatenate([[0], np.cumsum(self.position[last] - self.position[first] + 1)])
         return self.position + np.repeat(edges[:-1] - self.position[first], last - first + 1), edges
 
