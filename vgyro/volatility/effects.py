@@ -126,9 +126,9 @@ class Evidence:
         return few or (self.attract_long and self.calm_long[1] < VARIANCE_LEVEL)
 
     @property
-    def disturbed(self) -> bool:
-        """True if a knock is worth naming: any, but beside changing variance only one that no variance explains."""
-        return any(not self.heteroskedastic or episode.size > LOUD for episode in self.episodes)
+    def knocks(self) -> tuple[Episode, ...]:
+        """The disturbances worth naming: all, but beside changing variance only those that no variance explains."""
+        return tuple(episode for episode in self.episodes if not self.heteroskedastic or episode.size > LOUD)
 
 
 def gather_evidence(

@@ -84,8 +84,8 @@ def verdict_of(evidence: Evidence) -> str:
         words.append("drift")
     if evidence.tone is not None:
         words.append(f"tone at {_hertz(evidence.tone.frequency)}")
-    if evidence.disturbed:
-        words.append(_disturbance(evidence.episodes))
+    if evidence.knocks:
+        words.append(_disturbance(evidence.knocks))
     if not words and evidence.neighbours is not None:
         words.append("correlation")
     return " + ".join(words) or NOTHING
@@ -122,8 +122,8 @@ def _sentence(evidence: Evidence, others: Sequence[Evidence | None], sampled: Sa
         )
     if evidence.tone is not None:
         clauses.append(_tone_clause(evidence.tone, sampled))
-    if evidence.disturbed:
-        clauses.append(_disturbance_clause(evidence.episodes, others))
+    if evidence.knocks:
+        clauses.append(_disturbance_clause(evidence.knocks, others))
     if not clauses and evidence.neighbours is not None:
         clauses.append(
             f"neighbouring samples correlate by {evidence.neighbours:.2f}, which alone makes ARCH-LM fail "
@@ -150,7 +150,7 @@ def _variance_clause(evidence: Evidence) -> str:
 
 def _garch_clause(evidence: Evidence, garch: Garch | None) -> list[str]:
     """Whether GARCH(1,1) of the level explains the effect; a knock rules the fit, which then says nothing."""
-    if garch is None or evidence.disturbed or not math.isfinite(evidence.standardised[1]):
+    if garch is None or evidence.knocks or not math.isfinite(evidence.standardised[1]):
         return []
     fits = min(evidence.standardised[1], evidence.standardised_long[1]) >= MODEL_LEVEL
     found = f"GARCH(1,1) of the level (α = {garch.alpha:.2f}, β = {garch.beta:.2f})"
@@ -199,7 +199,7 @@ def _rest_clause(evidence: Evidence) -> str:
     few = evidence.calm[1] <= evidence.calm_long[1]
     lags, test = (evidence.lags, evidence.calm) if few else (LONG_LAGS, evidence.calm_long)
     tails = f"kurtosis {evidence.calm_kurtosis:.1f}"
-    if evidence.disturbed:
+    if evidence.knocks:
         tails += f" ({evidence.kurtosis:.1f} with it)"
     return f"no change of variance is left (ARCH-LM, {lags} lag{'s' if lags > 1 else ''}: {_test_words(test)}, {tails})"
 
