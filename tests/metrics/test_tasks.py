@@ -35,22 +35,26 @@ def write_rates(
     at_rest: np.ndarray,
     reference: np.ndarray | None = None,
     moved: dict | None = None,
+    lost: int = 0,
+    **about: object,
 ):
+    # After `lost` samples in the middle a new segment begins.
+    segment = (np.arange(len(rate)) >= len(rate) // 2).astype(np.int32) * bool(lost)
     columns = {
-        "time": np.arange(len(rate)) / RATE_HZ,
-        "segment": np.zeros(len(rate), np.int32),
+        "time": (np.arange(len(rate)) + lost * segment) / RATE_HZ,
+        "segment": segment.astype(np.int32),
         "at_rest": at_rest,
         **({} if reference is None else {"reference": reference}),
         **{gyro: rate[:, column] for column, gyro in enumerate(gyros_of(board))},
     }
-    extra = {"rate_hz": RATE_HZ, **({} if reference is None else {"reference_axis": board.axes[0]})}
+    extra = {"rate_hz": RATE_HZ, **about, **({} if reference is None else {"reference_axis": board.axes[0]})}
     write_table(folder / "rates.parquet", columns, "rates", NOWHERE, extra)
     fused = {"time": columns["time"], "segment": columns["segment"], "average": rate.mean(axis=1)}
     fused["dcc_causal[level]"] = rate[:, :2].mean(axis=1)
     write_table(folder / "fused.parquet", fused, "fused", NOWHERE)
     write_table(
         folder / "moved.parquet",
-        moved or {"time": columns["time"], "segment": columns["segment"]},
+        {"time": columns["time"], "segment": columns["segment"], **(moved or {})},
         "moved",
         NOWHERE,
         {"injected_rate": INJECTED},
@@ -71,13 +75,16 @@ def run_noise(folder: Path, board: Board) -> dict:
     return read_json(folder / "noise.json")
 
 
-def run_measure(folder: Path, board: Board, kind: str) -> dict[tuple[str, str, str], dict[str, object]]:
+def run_measure(
+    folder: Path, board: Board, kind: str, true_rate: float = 0.0
+) -> dict[tuple[str, str, str], dict[str, object]]:
     inputs = {name: [folder / f"{name}.parquet"] for name in ("rates", "fused", "methods", "moved")}
     options = {**OPTIONS, "axis": board.axes[0], "board": board.model_dump(mode="json"), "recording": "r", "kind": kind}
     measure.main(Task(inputs, {name: folder / f"{name}.parquet" for name in TABLES}, options, ""))
     table = read_columns(folder / "metrics.parquet")
     rows = [dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)]
-    return {(row["method"], row["definition"], row["metric"]): row for row in rows}
+    chosen = [row for row in rows if row["true_rate"] == true_rate]
+    return {(row["method"], row["definition"], row["metric"]): row for row in chosen}
 
 
 def white(samples: int, number: int, seed: int = 1) -> np.ndarray:
@@ -143,3 +150,72 @@ def test_an_empty_recording(tmp_path: Path, board: Board):
     write_rates(tmp_path, board, np.empty((0, len(gyros_of(board)))), np.empty(0, bool))
     assert run_measure(tmp_path, board, "static") == {}
     assert all(value is None for value in run_noise(tmp_path, board)["arw"].values())
+
+
+def test_counts_of_what_is_lost_clipped_and_far_off(tmp_path: Path, board: Board):
+    gyros = gyros_of(board)
+    rate = white(20_000, len(gyros))
+    rate[5000, 1] += 100.0
+    at_rest = np.ones(len(rate), bool)
+    at_rest[[100, 101]] = False  # as convert marks clipped samples
+    write_rates(tmp_path, board, rate, at_rest, lost=3, clipped={gyros[0]: 2, gyros[1]: 0})
+    rows = run_measure(tmp_path, board, "static")
+    assert [rows[gyro, "", "clipped"]["value"] for gyro in gyros[:2]] == [2, 0]
+    assert [rows[gyro, "", "outliers"]["value"] for gyro in gyros[:3]] == [0, 1, 0]
+    assert {row["value"] for key, row in rows.items() if key[2] == "missing"} == {5}
+    assert ("average", "", "clipped") not in rows
+    # Neither ends an average: the longest is a third of the recording.
+    allan = read_columns(tmp_path / "allan.parquet")
+    assert allan["tau"].max() > 0.8 * len(rate) / RATE_HZ / 3
+    assert rows[gyros[1], "", "arw"]["value"] == pytest.approx(60 * N, rel=0.03)
+    # The noise that the filters are designed from does not see the outlier, nor does its correlation.
+    record = run_noise(tmp_path, board)
+    assert record["arw"][gyros[1]] == pytest.approx(N, rel=0.03)
+    assert abs(record["correlation"][0][1]) < 0.05
+
+
+def test_the_same_at_another_rate(tmp_path: Path, board: Board):
+    # A method that shrinks towards zero: perfect at rest, off by half of a constant rate.
+    rate = white(20_000, len(gyros_of(board)))
+    moved = {"dcc_causal[level]": rate[:, :2].mean(axis=1) - INJECTED / 2}
+    write_rates(tmp_path, board, rate, np.ones(len(rate), bool), moved=moved)
+    at_rest = run_measure(tmp_path, board, "static")
+    rows = run_measure(tmp_path, board, "static", INJECTED)
+    assert {key[:2] for key in rows} == {("dcc_causal", "level")}
+    key = "dcc_causal", "level"
+    assert rows[*key, "mean"]["value"] == pytest.approx(at_rest[*key, "mean"]["value"] - INJECTED / 2)
+    assert rows[*key, "if_sigma"]["value"] == pytest.approx(at_rest[*key, "if_sigma"]["value"])
+    assert rows[*key, "if_mean"]["value"] < at_rest[*key, "if_mean"]["value"]
+    assert set(read_columns(tmp_path / "allan.parquet")["series"]) == {*gyros_of(board), "average", "dcc_causal[level]"}
+
+
+def test_a_constant_rate_has_static_figures_of_its_errors(tmp_path: Path, board: Board):
+    number, set_rate = len(gyros_of(board)), 40.0
+    reference = np.full(20_000, set_rate)
+    write_rates(tmp_path, board, 0.3 + set_rate + white(20_000, number), np.zeros(20_000, bool), reference)
+    rows = run_measure(tmp_path, board, "constant", set_rate)
+    assert rows["average", "", "mean"]["value"] == pytest.approx(0.3, abs=0.02)
+    assert rows["average", "", "arw"]["value"] == pytest.approx(60 * N / math.sqrt(number), rel=0.03)
+    assert rows["average", "", "if_sigma"]["low"] < math.sqrt(number) < rows["average", "", "if_sigma"]["high"]
+    dynamic = run_measure(tmp_path, board, "constant")
+    assert dynamic["average", "", "error_mean"]["value"] == pytest.approx(rows["average", "", "mean"]["value"])
+    assert ("average", "", "arw") not in dynamic
+
+
+def test_tones_and_covariances_of_the_gyros(tmp_path: Path, board: Board):
+    gyros = gyros_of(board)
+    rate = white(30_000, len(gyros)) + 0.02 * np.random.default_rng(9).standard_normal((30_000, 1)) * math.sqrt(RATE_HZ)
+    rate[:, :2] += 0.1 * np.sin(2 * np.pi * 6.5 * np.arange(30_000) / RATE_HZ)[:, None]
+    write_rates(tmp_path, board, rate, np.ones(30_000, bool))
+    run_measure(tmp_path, board, "static")
+    tones = read_columns(tmp_path / "tones.parquet")
+    assert sorted(tones["gyro"]) == sorted(gyros[:2])
+    np.testing.assert_allclose(tones["frequency"], 6.5, atol=0.01)
+    assert np.all((tones["low"] < 0.1) & (tones["high"] > 0.1))
+    assert set(tones["shared"]) == {", ".join(gyros[:2])}
+    cross = read_columns(tmp_path / "cross_allan.parquet")
+    number = len(gyros)
+    assert len(cross["tau"]) == len(np.unique(cross["tau"])) * number * (number + 1) // 2
+    # Known truth: common white noise of 0.02 in each of 0.1 and 0.02: covariance 4e-4/τ.
+    other = (cross["gyro"] == gyros[2]) & (cross["other"] == gyros[3]) & (cross["tau"] == 1.0)
+    assert cross["low"][other] < 4e-4 / (N**2 + 4e-4) < cross["high"][other]

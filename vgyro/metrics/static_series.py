@@ -49,7 +49,7 @@ class Measured:
 class RestRecording:
     """What all series of one recording at rest share.
 
-    sampling  : of the samples at rest;  segment [T] : of these, the gap-free runs
+    sampling  : of the samples at rest;  segment [T] : of these, the gap-free runs;  missing : lost within stretches
     grid, places, seconds : units of 1 s; those of them that are 0.9 full, and when they were
     equaliser : to the common bandwidth; None: nothing limits the bandwidth
     equal     : units at the common bandwidth
@@ -58,6 +58,7 @@ class RestRecording:
 
     sampling: Sampling
     segment: np.ndarray
+    missing: int
     grid: UnitGrid
     places: np.ndarray
     seconds: Sampling
@@ -85,7 +86,8 @@ class RestRecording:
             equaliser = Equaliser.of(bandwidth_hz, sampling.rate_hz, segment, engine)
             equal = unit_grid(equaliser.cuts, sampling.rate_hz)
         angle = AngleGrid.of(sampling, each=poses)
-        return cls(sampling, segment, grid, places, seconds, angle, equaliser, equal, poses, options, engine)
+        missing = sampling.missing
+        return cls(sampling, segment, missing, grid, places, seconds, angle, equaliser, equal, poses, options, engine)
 
     def measure(self, values: np.ndarray, low_pass: LowPass) -> Measured:
         """Figures of one series [T], deg/s.
@@ -97,10 +99,14 @@ class RestRecording:
         options, rate_hz = self.options, self.sampling.rate_hz
         cleaned, outliers = without_outliers(values, rate_hz, self.segment, options.outlier_threshold)
         any_out = bool(outliers.any())
-        kept, sampling = (values[~outliers], self.sampling.without(outliers)) if any_out else (values, self.sampling)
+        kept = values[~outliers] if any_out else values
+        # Without any loss the stretches are gap-free, and the lean way is open.
+        lossless = self.missing == 0 and not any_out
+        sampling = None if lossless else self.sampling.without(outliers)
+        segment = self.segment if lossless else None
         curves = {
             kind: allan_deviation(
-                kept, rate_hz, None, None, options.confidence, self.engine, options.taus_per_octave,
+                kept, rate_hz, None, segment, options.confidence, self.engine, options.taus_per_octave,
                 sampling=sampling, kind=kind,
             )
             for kind in ("overlapping", *options.curves)
@@ -109,7 +115,7 @@ class RestRecording:
         curve = curves["overlapping"]
         fitted = noise_coefficients(curve, low_pass.bandwidth_hz, low_pass.dc_gain, options.bootstrap, options.seed)
         readings = paper_readings(curve, spectrum, fitted, rate_hz, low_pass.bandwidth_hz, low_pass.dc_gain)
-        readings["missing"] = counted(self.sampling.missing)
+        readings["missing"] = counted(self.missing)
         if options.outlier_threshold is not None:
             readings["outliers"] = counted(int(outliers.sum()))
         readings["angle_drift_60s"] = self.angle.drift(cleaned, options.confidence)

@@ -1,0 +1,94 @@
+"""1σ at one bandwidth, against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from vgyro.config import MetricsOptions
+from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, select
+from vgyro.metrics import Equaliser, LowPass, Sampling, common_bandwidth, static_figures
+
+RATE_HZ = 100.0
+OPTIONS = MetricsOptions(bootstrap=60)
+
+
+def keep_of(bandwidth_hz: float) -> float:
+    return math.exp(-2 * math.pi * bandwidth_hz / RATE_HZ)
+
+
+def low_passed(signal: np.ndarray, bandwidth_hz: float, gain: float = 1.0) -> np.ndarray:
+    """The low-pass by scipy, from the first sample on."""
+    keep = keep_of(bandwidth_hz)
+    return lfilter([(1 - keep) * gain], [1, -keep], signal, zi=[keep * signal[0]])[0]
+
+
+def test_white_noise_after_the_low_pass():
+    # Closed form: a one-pole low-pass leaves (1 - k)/(1 + k) of the variance of white noise.
+    values = np.random.default_rng(1).standard_normal(400_000)
+    equaliser = Equaliser.of(2.0, RATE_HZ, np.zeros(len(values), int))
+    found = equaliser.apply(values, LowPass())
+    keep = keep_of(2.0)
+    # 400,000 samples hold 400,000·π·2/100 ≈ 25,000 independent ones: 1σ to 0.45 %.
+    assert np.std(found) == pytest.approx(math.sqrt((1 - keep) / (1 + keep)), rel=0.015)
+    assert len(found) == len(values) - equaliser.settling
+
+
+@pytest.mark.parametrize("own", [None, 0.5, 2.0, 10.0], ids=["not limited", "narrower", "the same", "wider"])
+def test_whatever_a_series_went_through_it_ends_at_the_same(own):
+    # The same white noise, after a low-pass of any bandwidth and gain: sample by sample the same series.
+    white = np.random.default_rng(2).standard_normal(5000)
+    equaliser = Equaliser.of(2.0, RATE_HZ, np.zeros(len(white), int))
+    wanted = low_passed(white, 2.0)[equaliser.settling :]
+    given = white if own is None else low_passed(white, own, 0.7)
+    found = equaliser.apply(given, LowPass(own, 1.0 if own is None else 0.7))
+    # e^-8: what is left of a start that differs.
+    np.testing.assert_allclose(found, wanted, atol=2e-3)
+    np.testing.assert_allclose(found[1000:], wanted[1000:], atol=1e-9)
+
+
+def test_each_stretch_begins_anew_and_loses_its_settling():
+    values = np.concatenate([np.full(500, 3.0), np.full(40, 9.0), np.full(500, -1.0)])
+    equaliser = Equaliser.of(2.0, RATE_HZ, np.repeat([0, 1, 2], [500, 40, 500]))
+    assert equaliser.settling == math.ceil(8 * RATE_HZ / (4 * math.pi))
+    found = equaliser.apply(values, LowPass())
+    assert [stop - start for start, stop in equaliser.cuts] == [500 - equaliser.settling] * 2
+    np.testing.assert_allclose(found, np.repeat([3.0, -1.0], 500 - equaliser.settling))
+
+
+def test_the_common_bandwidth():
+    assert common_bandwidth([LowPass(), LowPass(1.0), LowPass(0.3)], None) == 0.3
+    assert common_bandwidth([LowPass(), LowPass(1.0)], 5.0) == 5.0
+    assert common_bandwidth([LowPass(), LowPass()], None) is None
+
+
+def test_filters_and_a_low_passed_average_have_the_same_sigma():
+    # For a constant rate a Kalman filter of equal gyros is their average after a low-pass: no better than that.
+    rate = 0.5 + np.random.default_rng(3).standard_normal((60_000, 4))
+    at_rest, segment = np.ones(len(rate), bool), np.zeros(len(rate), np.int32)
+    array = ArrayRates(rate, RATE_HZ, segment, at_rest, ArrayNoise(np.full(4, 0.1), np.full(4, 1e-3), np.eye(4)))
+    methods = select(["average", "jiang_markov", "jiang_random_walk", "xue_2012", "chang_2012"])
+    fused = [method.fuse(array, FilterParameters(bandwidth_hz=1.0, tau_s=20.0)) for method in methods]
+    filters = [LowPass()] * 4
+    filters += [LowPass(one.bandwidth_hz if math.isfinite(one.bandwidth_hz) else None, one.dc_gain) for one in fused]
+    series = [*rate.T, *(one.rate for one in fused)]
+    found = static_figures(series, Sampling.of(RATE_HZ, segment), 4, filters, OPTIONS).readings
+    raw = [row["sigma"].value for row in found[4:]]
+    equal = [row["sigma_equal"].value for row in found[4:]]
+    assert max(raw) > 4 * min(raw)
+    np.testing.assert_allclose(equal, equal[0], rtol=1e-3)
+    for row in found[4:]:
+        assert "low-passed to 1 Hz" in row["sigma_equal"].note
+        # √4 for independent gyros.
+        assert row["if_sigma_equal"].low <= 2 <= row["if_sigma_equal"].high
+    assert found[5]["if_sigma"].low > 2.5
+
+
+def test_where_nothing_limits_the_band_there_is_nothing_to_compare():
+    values = np.random.default_rng(4).standard_normal((3000, 3))
+    sampling = Sampling.of(RATE_HZ, np.zeros(3000, int))
+    assert "sigma_equal" not in static_figures(values.T, sampling, 2, [LowPass()] * 3, OPTIONS).readings[0]
+    short = static_figures(values.T, sampling, 2, [LowPass()] * 2 + [LowPass(0.01)], OPTIONS).readings
+    assert math.isnan(short[0]["sigma_equal"].value)
+    assert "long enough" in short[0]["sigma_equal"].note
