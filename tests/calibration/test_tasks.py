@@ -8,6 +8,7 @@ import pytest
 from vgyro.board import Board, parse_board
 from vgyro.dataset import Manifest
 from vgyro.errors import DataError
+from vgyro.simulate import manifest_of, parse_twin, simulate_recording
 from vgyro.storage.tables import Provenance, read_columns, read_json, read_metadata, write_json, write_table
 from vgyro.tasks import calibrate, convert
 from vgyro.tasks.common import Task
@@ -122,6 +123,43 @@ def test_logged_reference(tmp_path: Path, board: Board):
     wrong = manifest(calibration_run(reference={**reference, "rate": "speed"}))
     with pytest.raises(DataError, match="no column 'speed'"):
         run_calibrate(tmp_path, board, wrong, [frames], [log])
+
+
+def test_a_gyro_the_wrong_way_round_is_one_clear_error(tmp_path: Path, board: Board):
+    turned = tuple(gyro.model_copy(update={"sign": -gyro.sign}) if gyro.name == "g3" else gyro for gyro in board.gyros)
+    wrong = board.model_copy(update={"gyros": turned})
+    frames = write_frames(tmp_path / "calibration", counts_of(board, staircase()))
+    with pytest.raises(DataError) as caught:
+        run_calibrate(tmp_path, wrong, manifest(calibration_run()), [frames])
+    words = str(caught.value)
+    assert words.startswith("calibration, board dsp6: ")
+    assert "'g3'" in words
+    assert "Set its sign to 1 in the board file" in words
+
+
+def test_a_table_about_one_axis_tells_the_cross_axis_of_the_others(tmp_path: Path, root: Path):
+    # Simulated: gx sees 0.5 % of the rate about y, gz nothing. White noise of 0.05 deg/√h over 4 s is 0.4 mdeg/s.
+    kvh = parse_board((root / "config/boards/kvh1750.yaml").read_text(encoding="utf-8"), "kvh1750")
+    rates = [0, 50, 100, 150, 100, 50, 0, -50, -100, -150, -100, -50, 0]
+    twin = parse_twin(
+        "name: t\nboard: kvh1750\nseed: 5\ngyros: {all: {arw_deg_rt_h: 0.05}, gx: {cross_axis: 0.005}}\n"
+        "recordings: [{name: calibration, kind: calibration, axis: y, rate_hz: 50, motion: "
+        f"{{kind: rate_table, rates: {rates}, settle_s: 1, plateau_s: 4}}}}]",
+        "t.yaml",
+    )
+    simulated = simulate_recording(twin, kvh, "calibration")
+    segment = np.zeros(simulated.time.size, np.int32)
+    columns = {"time": simulated.time, "segment": segment, **simulated.counts}
+    record = manifest_of(twin)
+    found = run_calibrate(tmp_path, kvh, record, [write_frames(tmp_path / "calibration", columns)])
+    about_y = found["gyros"]["gx"]["figures"]["cross_axis"]
+    assert about_y["low"] < 0.5 < about_y["high"]
+    assert about_y["value"] == pytest.approx(0.5, abs=0.005)
+    assert about_y["note"] == "about y"
+    assert found["gyros"]["gz"]["figures"]["cross_axis"]["state"] == "below the floor"
+    assert found["gyros"]["gy"]["figures"]["cross_axis"]["note"] == "no recording about another axis"
+    assert found["gyros"]["gy"]["source"] == "measured"
+    assert found["gyros"]["gx"]["source"] == "nominal"
 
 
 def test_refused_recordings_are_skipped(tmp_path: Path, board: Board):

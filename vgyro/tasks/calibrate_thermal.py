@@ -149,17 +149,22 @@ def thermal_of(gyro: Gyro, board: Board, main: ScaleFit, tests: Sequence[Test], 
     constant, first, second, third = map(float, fit.coefficients)
     bias = (constant, first, second, third)
     shape = Compensation(fit.reference_c, fit.low_c, fit.high_c, _applied_slope(slope), bias)
-    sources = tuple(dict.fromkeys([*recordings, *(cycles.recordings if slope.state == VALUE else ())]))
+    sources = tuple(dict.fromkeys([*recordings, *(cycles.recordings if _shown(slope) else ())]))
     return Thermal(figures, shape.anchored(main.bias), fit, sources, points, fit.note)
+
+
+def _shown(slope: Finding) -> bool:
+    """Is there a slope of the scale factor?  Two temperatures alone give one without limits: that shows nothing."""
+    return slope.state == VALUE and math.isfinite(slope.low)
 
 
 def _applied_slope(slope: Finding) -> float:
     """1/K, of S; nothing where it is not shown."""
-    return slope.value / parts_per_million(1.0) if slope.state == VALUE else 0.0
+    return slope.value / parts_per_million(1.0) if _shown(slope) else 0.0
 
 
 def _without_bias(figures: dict[str, Finding], slope: Finding, main: ScaleFit, cycles: Cycles) -> Thermal:
-    if slope.state != VALUE:
+    if not _shown(slope):
         return Thermal(figures)
     low, high = float(cycles.temperature.min()), float(cycles.temperature.max())
     compensation = Compensation(main.temperature_c, low, high, _applied_slope(slope), (main.bias, 0.0, 0.0, 0.0))
