@@ -1,7 +1,7 @@
 """Scale factor, bias, conversion to deg/s, and where the board stands still. Pure functions of arrays."""
 
 from vgyro.calibration.convert import clipped_samples, fit_phase, sinusoid, to_rates
-from vgyro.calibration.figures import Finding, figure_record, not_measured
+from vgyro.calibration.figures import BELOW, FIGURES, MISSING, VALUE, Finding, figure_record, not_measured
 from vgyro.calibration.plateaus import DIRECTION_NAMES, PlateauMeans, average_plateaus, find_plateaus
 from vgyro.calibration.repeatability import bias_repeatability, scale_repeatability
 from vgyro.calibration.rest import find_rest
@@ -17,7 +17,11 @@ from vgyro.calibration.thermal import (
 )
 
 __all__ = [
+    "BELOW",
     "DIRECTION_NAMES",
+    "FIGURES",
+    "MISSING",
+    "VALUE",
     "BiasTemperature",
     "Compensation",
     "Finding",

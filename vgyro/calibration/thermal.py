@@ -135,7 +135,7 @@ def fit_bias_temperature(
     coefficients, covariance = np.zeros(HIGHEST_ORDER + 1), np.zeros((HIGHEST_ORDER + 1, HIGHEST_ORDER + 1))
     coefficients[: order + 1] = fit.estimate * unit
     covariance[: order + 1, : order + 1] = fit.covariance * np.outer(unit, unit)
-    line = fits[1] if order == 0 else fit
+    line = fits[-1]  # the highest order: what selecting one leaves out would be missing in the limits
     combination = _line_of(line, temperature, reference, span)
     slope, half = float(combination @ line.estimate), line.half_width(combination, confidence)
     return BiasTemperature(
