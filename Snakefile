@@ -53,4 +53,4 @@ include: "workflow/rules/papers.smk"
 
 onerror:
     # One bad data set must not take the overview of the others away.
-    shell(index_command())
+    shell("{command}", command=index_command())
