@@ -165,8 +165,8 @@ def outliers(rng: np.random.Generator, rate: np.ndarray, share: float) -> np.nda
 
 @pytest.mark.parametrize("share", [0.001, 0.01])
 def test_outliers_hardly_move_the_robust_one(share: float):
-    # Known truth: white noise and random walk. The same series without outliers differs by less than a fifth of the
-    # standard error; the overlapping one is far off.
+    # Known truth: white noise and random walk, within five standard errors. The same series without outliers differs by
+    # less than 3 % below 10 s; the overlapping one reads 1.5 and more for 1.
     rng = np.random.default_rng(5)
     rate = rng.standard_normal(200_000) + np.cumsum(0.002 * rng.standard_normal(200_000))
     spoiled = outliers(rng, rate, share)
@@ -175,8 +175,7 @@ def test_outliers_hardly_move_the_robust_one(share: float):
     truth = np.sqrt(1 / m + 0.002**2 * m / 3 * (1 + 1 / (2 * m**2)))
     error = 1 / np.sqrt(2 * robust.edf)
     assert np.all(np.abs(robust.deviation / truth - 1) < 5 * error)
-    rather_short = m < 2000
-    assert np.all(np.abs(robust.deviation / clean.deviation - 1)[rather_short] < 0.03)
+    assert np.all(np.abs(robust.deviation / clean.deviation - 1)[m < 2000] < 0.03)
     plain = allan_deviation(spoiled, 200.0)
     assert plain.deviation[0] > 1.5
 

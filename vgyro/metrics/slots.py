@@ -43,17 +43,14 @@ class SlotSums:
         """
         slots = np.diff(self.edges)
         number = np.where(slots >= max(share, 2) * factor, (slots - 2 * factor) // stride + 1, 0)
-        within = np.arange(int(number.sum())) - np.repeat(np.cumsum(number) - number, number)
-        at = np.repeat(self.edges[:-1] + np.arange(len(slots)), number) + within * stride
-        have = [self.have[at + part * factor] for part in range(3)]
+        have = [_at(self.have, self.edges, number, stride, part * factor) for part in range(3)]
         before, after = have[1] - have[0], have[2] - have[1]
         need = (PRESENT_TENTHS * factor + 9) // 10
         good = (before >= need) & (after >= need)
-        at, weights = at[good], (1.0 / before[good], 1.0 / after[good])
+        weights = 1.0 / before[good], 1.0 / after[good]
+        total = [_at(self.total, self.edges, number, stride, part * factor)[good] for part in range(3)]
         columns = (-1, *[1] * (self.total.ndim - 1))
-        middle = self.total[at + factor]
-        d = (self.total[at + 2 * factor] - middle) * weights[1].reshape(columns)
-        d -= (middle - self.total[at]) * weights[0].reshape(columns)
+        d = (total[2] - total[1]) * weights[1].reshape(columns) - (total[1] - total[0]) * weights[0].reshape(columns)
         return d, (weights[0] + weights[1]) / 2 - 1 / factor, len(good)
 
     def block_means(self, factor: int) -> tuple[np.ndarray, np.ndarray]:
@@ -78,3 +75,11 @@ class SlotSums:
         means = (self.total[at + factor] - self.total[at])[good] / have[good]
         apart = (np.diff(at[good]) != factor) | (np.diff(stretch[good]) != 0)
         return means, np.concatenate([[0], np.flatnonzero(apart) + 1, np.full(int(len(means) > 0), len(means))])
+
+
+def _at(values: np.ndarray, edges: np.ndarray, number: np.ndarray, stride: int, offset: int) -> np.ndarray:
+    """values [P, …] at number [S] borders of each stretch, `stride` apart, the first `offset` behind its begin."""
+    if len(number) == 1:
+        return values[offset : offset + int(number[0]) * stride : stride][: int(number[0])]
+    within = np.arange(int(number.sum())) - np.repeat(np.cumsum(number) - number, number)
+    return values[np.repeat(edges[:-1] + np.arange(len(number)) + offset, number) + within * stride]
