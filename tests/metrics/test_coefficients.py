@@ -98,10 +98,11 @@ def test_the_gyros_own_low_pass_is_noticed():
 
 
 def test_quantisation_is_noticed():
-    # Rounding the angle adds 3Q²/τ² with Q = step/√12, the s.d. of a uniform number (IEEE Std 952-1997); N must stay.
+    # Rounding the angle adds 3Q²/τ² with Q = step/√12, the s.d. of a uniform number (IEEE Std 952-1997): the angle moves
+    # by half a step between samples, so that the errors are independent. N must stay.
     rng = np.random.default_rng(4)
     angle = np.cumsum(N * np.sqrt(100.0) * rng.standard_normal(200_000)) / 100
-    step = 0.1
+    step = 0.02
     rate = np.diff(np.round(angle / step + rng.random()) * step) * 100
     fit = noise_coefficients(allan_deviation(rate, 100.0))
     assert fit.N.value == pytest.approx(N, rel=0.03)
@@ -111,10 +112,10 @@ def test_quantisation_is_noticed():
 
 
 def test_quantisation_without_evidence_has_a_limit():
-    # White noise alone; the limit is far below what the whole first point would allow, 3Q²/τ² = N²/τ.
+    # White noise alone; the limit is below a tenth of the variance of the first point, 3Q²/τ² = N²/(10τ).
     fit = noise_coefficients(allan_deviation(simulate(np.random.default_rng(5), 50.0, 1200.0, N, 0.0), 50.0))
     assert fit.Q.value == fit.Q.low == fit.R.value == fit.R.low == 0
-    assert 0 < fit.Q.high < 0.2 * N * math.sqrt(0.02 / 3)
+    assert 0 < fit.Q.high < N * math.sqrt(0.02 / 30)
     assert fit.R.high > 0
     assert fit.note == ""
 

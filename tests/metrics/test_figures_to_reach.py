@@ -231,7 +231,7 @@ def test_evidence_of_quantisation_and_ramp(full: bool, term: str, truth: float):
     number = 200 if full else 12
     keyword = {"Q": "quantised", "R": "ramp"}[term]
     fits = tuple(
-        noise_coefficients(curve_with(seed, **{keyword: truth}), replicates=200 if full else 100)
+        noise_coefficients(curve_with(seed, **{keyword: truth}), replicates=200 if full else 50)
         for seed in range(number)
     )
     found = Runs(fits, TRUTH | {term: truth})

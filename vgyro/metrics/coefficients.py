@@ -16,7 +16,7 @@ __all__ = ["Coefficient", "NoiseCoefficients", "low_pass_factor", "model_deviati
 FITTED_KINDS = ("overlapping", "robust")
 FEWEST_POINTS = 6
 LARGEST_MISFIT = 5.0
-EVIDENCE = 0.01  # largest probability by chance at which Q or R is taken to exist
+EVIDENCE, DRAWS = 0.005, 400  # largest probability by chance at which Q or R is taken to exist; drawn curves
 LARGEST_SIGMAS, LARGEST_RELATIVE = 4.0, 0.01  # a variance agrees with the model within the larger of the two
 
 
@@ -70,11 +70,13 @@ def noise_coefficients(
     bandwidth_hz : -3 dB bandwidth of a first-order low-pass that the series went through; its effect on the white term
                    is put into the model and τ < 2Tc is left out; None: not limited
     dc_gain      : gain of that filter for a constant rate; all coefficients are divided by it
-    replicates   : draws for limits and evidence;  seed : of the draws;  confidence : None takes that of the curve
+    replicates   : draws for the limits;  seed : of all draws;  confidence : None takes that of the curve
     returns      : NoiseCoefficients, NaN with a note where the curve has fewer than 3 points
     raises       : ValueError for a modified or Hadamard deviation, whose terms have other shapes
-    Reweighted non-negative least squares on σ², weight edf/2. For N, B and K its scatter is that of an efficient
-    estimator (test_figures_to_reach.py). Q and R: chance_of_gain at most 0.01, and 6 points at least. Limits: Limits.
+    Reweighted non-negative least squares on σ², weight edf/2; its scatter for N, B and K is near the Cramér-Rao bound.
+    Q and R are in the model if chance_of_gain is at most 0.005 (6 points at least): of series without them about one in
+    a hundred, or less, shows one. A ramp is told from a random walk only where it is far larger over the whole series;
+    a smaller one is in K. Limits: Limits.
     Without a bandwidth, where the shortest τ do not fit the rest, a term in 1/τ² of either sign is tried: negative is a
     low-pass of the gyro itself (-3TcN²/2τ²), which hides any Q; the τ that still do not fit are left out.
     Where Q cannot be told from a low-pass, its upper limit is what the curve has room for: 3Q²/τ² <= σ² at every τ.
@@ -92,7 +94,7 @@ def noise_coefficients(
         zero = Coefficient(0.0, 0.0, 0.0)
         return NoiseCoefficients(zero, zero, zero, float(whole.tau[0]), 0.0, "the series is constant", zero, zero)
     drawing = Drawing(replicates, seed)
-    model, first = _describe(whole, constant, drawing)
+    model, first = _describe(whole, constant, Drawing(DRAWS, seed))
     fitted = whole.since(first)
     squares = fit(model, fitted)
     tail = (1 - (curve.confidence if confidence is None else confidence)) / 2
