@@ -76,6 +76,12 @@ def results() -> dict[str, object]:
     found["allan 3"] = allan.differences(rate[:3, 0].copy(), np.array([1]))
     edges = np.array([0, 5, 1000, 1003, 3001])
     found["allan stretches"] = allan.differences(rate[:, 1].copy(), factors, edges)
+    slot = np.delete(np.arange(3062), np.arange(50, 3050, 50))[:3001]
+    sums = allan.slot_sums(rate[:, 3].copy(), slot, np.array([0, 20, 3062]))
+    found["allan slots"] = sums
+    for kind in ("overlapping", "modified", "hadamard"):
+        found[f"allan {kind}"] = allan.differences(rate[:, 1].copy(), factors, edges, 3, kind)
+        found[f"allan losses {kind}"] = allan.differences_over_losses(*sums, np.array([0, 20, 3062]), factors, 3, kind)
     found["lag products"] = allan.lag_products(rate[:, 2].copy(), factors, edges)
     found["frames"] = frames_results(rng)
     return found

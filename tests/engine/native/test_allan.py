@@ -1,5 +1,6 @@
 """Allan kernels against allantools, the reference engine and the definition; bits on every path."""
 
+import itertools
 import subprocess
 import sys
 
@@ -29,14 +30,16 @@ def factors_of(samples: int) -> np.ndarray:
     return np.unique(np.geomspace(1, max(samples // 3, 1), 40).astype(np.int64))
 
 
+@pytest.mark.parametrize("estimator", ["overlapping", "modified", "hadamard"])
 @pytest.mark.parametrize("kind", ["white", "biased", "drifting", "single"])
 @pytest.mark.parametrize("samples", [3, 4, 5, 11, 2047, 2050, 300_001])
-def test_differences_equal_allantools(kind: str, samples: int):
+def test_differences_equal_allantools(kind: str, samples: int, estimator: str):
     rate, factors = series(kind, samples), factors_of(samples)
-    sums, counts = allan.differences(rate, factors)
-    expected, number = reference.differences(rate, factors)
+    sums, counts = allan.differences(rate, factors, kind=estimator)
+    expected, number = reference.differences(rate, factors, kind=estimator)
     np.testing.assert_array_equal(counts, number)
-    np.testing.assert_allclose(sums, expected, rtol=1e-12)
+    # allantools sums the angle of the modified variance up over the whole series.
+    np.testing.assert_allclose(sums, expected, rtol=1e-9 if estimator == "modified" else 1e-12)
 
 
 def test_a_day_at_200_hz_equals_allantools():
@@ -71,12 +74,12 @@ def test_lag_products_equal_the_reference(kind: str, samples: int):
 def test_stretches_are_summed_without_bridging():
     rate, edges = series("drifting", 50_000), np.array([0, 3, 10, 10, 5_000, 20_001, 20_050, 50_000])
     factors = np.array([1, 2, 3, 16, 500, 5_000, 9_000, 15_000])
-    for share in (2, 3):
-        sums, counts = allan.differences(rate, factors, edges, share)
-        expected, number = reference.differences(rate, factors, edges, share)
+    for share, kind in itertools.product((2, 3, 4), ("modified", "hadamard", "overlapping")):
+        sums, counts = allan.differences(rate, factors, edges, share, kind)
+        expected, number = reference.differences(rate, factors, edges, share, kind)
         np.testing.assert_array_equal(counts, number)
-        np.testing.assert_allclose(sums, expected, rtol=1e-12)
-    assert number[-1] == 0 < number[-2]
+        np.testing.assert_allclose(sums, expected, rtol=1e-9 if kind == "modified" else 1e-12)
+    assert number[-1] == 0 < number[4]
     found = allan.lag_products(rate, factors, edges, 30)
     for ours, theirs in zip(found, reference.lag_products(rate, factors, edges, 30), strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * ours.max())
@@ -84,19 +87,81 @@ def test_stretches_are_summed_without_bridging():
         allan.differences(rate, factors, np.array([0, 60_000]))
 
 
+LOSSY_EDGES = np.array([0, 700, 701, 20_000, 60_000])
+
+
+def lossy_series() -> tuple[np.ndarray, np.ndarray]:
+    """Rates and slots: 60 000 slots in four stretches, of which single ones and a run of 500 are lost."""
+    there = np.random.default_rng(3).random(60_000) > 0.02
+    there[30_000:30_500] = False
+    there[LOSSY_EDGES[:-1]] = True
+    return series("drifting", 60_000)[there], np.flatnonzero(there)
+
+
+@pytest.mark.parametrize("kind", ["overlapping", "modified", "hadamard"])
+@pytest.mark.parametrize("share", [2, 3, 4])
+def test_differences_over_losses_equal_the_reference(kind: str, share: int):
+    rate, slot = lossy_series()
+    factors = np.array([1, 2, 3, 9, 10, 31, 63, 64, 127, 128, 200, 1000, 5000, 9999, 20_000, 50_000])
+    total, have = allan.slot_sums(rate, slot, LOSSY_EDGES)
+    expected_total, expected_have = reference.slot_sums(rate, slot, LOSSY_EDGES)
+    np.testing.assert_allclose(total, expected_total, atol=1e-9 * np.abs(total).max())
+    np.testing.assert_array_equal(have, expected_have)
+    ours = allan.differences_over_losses(total, have, LOSSY_EDGES, factors, share, kind)
+    theirs = reference.differences_over_losses(expected_total, expected_have, LOSSY_EDGES, factors, share, kind)
+    np.testing.assert_allclose(ours[0], theirs[0], rtol=1e-9)
+    np.testing.assert_allclose(ours[1], theirs[1], rtol=1e-9, atol=1e-9)
+    for one, two in zip(ours[2:], theirs[2:], strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert not ours[2][-1]
+    assert np.all(ours[2] <= ours[3])
+
+
+def test_a_difference_over_a_loss_by_hand():
+    # Slots 0 … 19 without 7: means over ten slots, of nine and of ten samples. Rates k², so means differ by their sums.
+    slot = np.delete(np.arange(20), 7)
+    rate = slot.astype(float) ** 2
+    total, have = allan.slot_sums(rate, slot, np.array([0, 20]))
+    sums, excess, counts, possible = allan.differences_over_losses(total, have, np.array([0, 20]), np.array([10]), 2)
+    assert (counts[0], possible[0]) == (1, 1)
+    assert sums[0] == pytest.approx((np.mean(rate[9:]) - np.mean(rate[:9])) ** 2 / 2, rel=1e-12)
+    assert excess[0] == pytest.approx((1 / 9 + 1 / 10 - 2 / 10) / 2, rel=1e-12)
+
+
+def test_without_a_loss_the_sums_are_the_strict_ones():
+    rate, factors, edges = series("drifting", 30_000), np.array([1, 5, 64, 127]), np.array([0, 10_000, 30_000])
+    for kind in ("overlapping", "modified", "hadamard"):
+        parts = (*allan.slot_sums(rate, np.arange(30_000), edges), edges)
+        sums, excess, counts, possible = allan.differences_over_losses(*parts, factors, 4, kind)
+        expected, number = allan.differences(rate, factors, edges, 4, kind)
+        np.testing.assert_allclose(sums, expected, rtol=1e-9)
+        np.testing.assert_allclose(excess, 0, atol=1e-9)
+        np.testing.assert_array_equal(counts, number)
+        np.testing.assert_array_equal(possible, number)
+
+
+def test_no_sample_and_no_factor():
+    total, have = allan.slot_sums(np.empty(0), np.empty(0, int), np.array([0, 5]))
+    found = allan.differences_over_losses(total, have, np.array([0, 5]), np.array([1]))
+    assert [part.tolist() for part in found] == [[0.0], [0.0], [0], [4]]
+    assert allan.differences_over_losses(total, have, np.array([0, 5]), np.empty(0, int))[2].size == 0
+
+
 @pytest.mark.parametrize("value", [3.0, 0.1, -1e-7])
 def test_constant_series_has_nothing(value: float):
-    assert not allan.differences(np.full(501, value), np.array([1, 10]))[0].any()
+    for kind in ("overlapping", "modified", "hadamard"):
+        assert not allan.differences(np.full(501, value), np.array([1, 10]), kind=kind)[0].any()
     assert not allan.lag_products(np.full(501, value), np.array([1, 10]))[0].any()
 
 
-@pytest.mark.parametrize("alpha", [-4, -2, -1, 0, 1, 2])
-def test_degrees_of_freedom_equal_allantools(alpha: int):
-    for factor in (1, 2, 5, 20, 33, 34, 100, 101, 12_345, 576_000):
-        samples = factor * np.array([3, 4, 5, 10, 100, 1000]) + np.array([0, -1, 30, 1, 0, 0])
+@pytest.mark.parametrize("kind", ["overlapping", "modified", "hadamard"])
+@pytest.mark.parametrize("alpha", [-4, -3, -2, -1, 0, 1, 2])
+def test_degrees_of_freedom_equal_allantools(alpha: int, kind: str):
+    for factor in (1, 2, 5, 20, 25, 26, 33, 34, 100, 101, 12_345, 576_000):
+        samples = factor * np.array([3, 4, 5, 6, 7, 10, 100, 1000]) + np.array([0, 0, 30, 1, 0, 1, 0, 0])
         np.testing.assert_allclose(
-            allan.degrees_of_freedom(alpha, factor, samples),
-            reference.degrees_of_freedom(alpha, factor, samples),
+            allan.degrees_of_freedom(alpha, factor, samples, kind),
+            reference.degrees_of_freedom(alpha, factor, samples, kind),
             rtol=1e-11,
         )
 
@@ -113,8 +178,14 @@ import numpy as np
 from vgyro.engine.native import allan
 rate = np.random.default_rng(1).standard_normal(2_000_003)
 factors = np.unique(np.geomspace(1, 600_000, 30).astype(np.int64))
-for values in (*allan.differences(rate, factors), *allan.lag_products(rate, factors)):
-    print(values.tobytes().hex())
+found = [*allan.lag_products(rate, factors)]
+slot, edges = np.arange(rate.size) + np.arange(rate.size) // 50, np.array([0, 900_000, 2_040_003])
+parts = allan.slot_sums(rate, slot, edges)
+for kind in ("overlapping", "modified", "hadamard"):
+    found += allan.differences(rate, factors, kind=kind)
+    found += allan.differences_over_losses(*parts, edges, factors, 3, kind)
+for values in (*parts, *found):
+    print(__import__("hashlib").sha256(values.tobytes()).hexdigest())
 """
 
 
