@@ -74,6 +74,10 @@ def _labels(array: ArrayPart) -> dict[Name, str]:
     return {(row["method"], row["definition"]): names[row["column"]] for row in array.methods() if row["column"]}
 
 
+def _causal(array: ArrayPart, name: Name) -> bool:
+    return next(bool(row["causal"]) for row in array.methods() if (row["method"], row["definition"]) == name)
+
+
 def factors_of(array: ArrayPart) -> tuple[tuple[str, str], ...]:
     """The factors by which methods are compared: the fair ones; raw 1σ where bandwidths were not made equal."""
     fair = any(FAIR in known for known in array.values().values())
@@ -84,19 +88,21 @@ def rest_sentences(dataset: DatasetPart, array: ArrayPart) -> list[Conclusion]:
     """The best methods at rest, whether DCC beats the baselines, and what fails at the added rate."""
     place = f"axis {array.axis}, {array.recording}"
     failed = failing(array)
-    parts = []
+    parts: dict[str, list[str]] = {}
     for figure, words in factors_of(array):
         best = best_method(array, figure)
         if best is None:
             continue
-        parts.append(f"by {words} {best.label}, improvement factor {factor(best.factor)}")
+        said = f"{factor(best.factor)} by {words}"
         if best.name in failed:
             holds = best_method(array, figure, lambda name: name not in failed)
             other = f"; of those that hold {holds.label}, {factor(holds.factor)}" if holds else ""
-            parts[-1] += f" (fails at {plain(array.added_rate)} deg/s{other})"
+            said += f" (fails at {plain(array.added_rate)} deg/s{other})"
+        parts.setdefault(f"{best.label}{'' if _causal(array, best.name) else ' (not causal)'}", []).append(said)
     if not parts:
         return []
-    found = [Conclusion(f"Best method at rest ({place}): {'; '.join(parts)}.", "", array.anchor)]
+    listed = "; ".join(f"{label}, improvement factor {', '.join(said)}" for label, said in parts.items())
+    found = [Conclusion(f"Best method at rest ({place}): {listed}.", "", array.anchor)]
     compared = [text for figure, words in factors_of(array) if (text := _dcc_words(array, figure, words))]
     if compared:
         found.append(Conclusion(f"Causal DCC ({place}) {'; '.join(compared)}.", "", array.anchor))
@@ -122,7 +128,7 @@ def _failing_sentence(dataset: DatasetPart, array: ArrayPart, place: str) -> lis
     )
     wins = f"improves 1σ {significant(gain(first))} times at rest but " if gain(first) > 1 else ""
     text = f"{labels[first]} {wins}fails at {plain(array.added_rate)} deg/s ({place}): {said}"
-    more = f"; so {'do' if len(others) > 1 else 'does'} {', '.join(others)}" if others else ""
+    more = f"; so {'do' if len(others) > 1 else 'does'} {'; '.join(others)}" if others else ""
     return [Conclusion(f"{text}{more}.", "warn", array.anchor)]
 
 

@@ -182,8 +182,8 @@ def _incomplete(recording: RecordingPart) -> list[Conclusion]:
         return [Conclusion(f"Recording {recording.name} was refused: {reasons}.", "bad", "recordings")]
     frames = recording.integrity["frames"]
     if 1 - frames["good_share"] > MOST_LOST:
-        text = f"{recording.name} lacks {percent(1 - frames['good_share'], 2)} of its frames; no figure bridges a gap."
-        return [Conclusion(text, "warn", "recordings")]
+        text = f"{recording.name} lacks {percent(1 - frames['good_share'], 2)} of its frames"
+        return [Conclusion(f"{text}; nothing is put in their place.", "warn", "recordings")]
     return []
 
 

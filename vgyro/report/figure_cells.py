@@ -9,6 +9,7 @@ from vgyro.report.tables import Cell, Column, Notes, number_cell
 NOT_SIGNIFICANT = "not significant"
 NOT_SHOWN = "not shown to exist"
 BAND_LIMITED = "band-limited"
+TAKES_PART = "the low-pass takes part"
 # Said of nearly every cell: a tooltip will do.
 ROUTINE = (
     "bootstrap of blocks",
@@ -21,7 +22,9 @@ ROUTINE = (
     "of the error",
     "low-passed to",
     BAND_LIMITED,
+    TAKES_PART,
 )
+ROUTINE_END = "degrees of freedom"
 
 
 def figure_column(figure: Figure, group: str = "") -> Column:
@@ -29,8 +32,19 @@ def figure_column(figure: Figure, group: str = "") -> Column:
     return Column(figure.title, "" if figure.unit == "1" else figure.unit, hint=figure.meaning, group=group)
 
 
-def figure_cell(value: Value | None, metric: str, notes: Notes, *, gyro: bool = False, best: bool = False) -> Cell:
-    """A figure with its interval, or why there is none; factors whose interval holds 1 are grey."""
+def says_limited(value: Value) -> bool:
+    """True if the note says that a low-pass lowers the figure by itself."""
+    return any(clause.startswith((BAND_LIMITED, TAKES_PART)) for clause in value.note.split("; "))
+
+
+def figure_cell(
+    value: Value | None, metric: str, notes: Notes, *, gyro: bool = False, best: bool = False, limited: bool = False
+) -> Cell:
+    """A figure with its interval, or why there is none; factors whose interval holds 1 are grey.
+
+    gyro : the row is that of a single gyro;  best : of its column
+    limited : a low-pass lowers it by itself, whether its note says so or not
+    """
     if value is None:
         hint = "compares a method with the single gyros" if gyro and metric.startswith("if_") else "not computed"
         return Cell("" if gyro and metric.startswith("if_") else MISSING, tone="muted", hint=hint)
@@ -40,7 +54,7 @@ def figure_cell(value: Value | None, metric: str, notes: Notes, *, gyro: bool = 
         return Cell(f"< {significant(value.high, 2)}", tone="muted", hint=value.note)
     insignificant = value.note.startswith(NOT_SIGNIFICANT)
     clauses = value.note.split("; ")
-    routine = insignificant or all(clause.startswith(ROUTINE) for clause in clauses)
+    routine = insignificant or all(clause.startswith(ROUTINE) or clause.endswith(ROUTINE_END) for clause in clauses)
     return number_cell(
         value.value,
         value.low,
@@ -48,5 +62,5 @@ def figure_cell(value: Value | None, metric: str, notes: Notes, *, gyro: bool = 
         tone="muted" if insignificant else "best" if best else "",
         notes=() if routine else notes.number(value.note),
         hint=value.note,
-        mark=BAND_LIMITED if any(clause.startswith(BAND_LIMITED) for clause in clauses) else "",
+        mark=BAND_LIMITED if limited or says_limited(value) else "",
     )

@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from vgyro.report.figure_cells import BAND_LIMITED, figure_cell, figure_column
+from vgyro.report.figure_cells import BAND_LIMITED, figure_cell, figure_column, says_limited
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import ArrayPart, DatasetPart, Figure, Value, Values
 from vgyro.report.numbers import MISSING, count, significant
@@ -50,6 +50,8 @@ COEFFICIENTS = (
     ("angle_drift_60s", ANGLE),
     ("angle_bound_60s", ANGLE),
 )
+# What any low-pass lowers by itself; of a reading at 1 s the note says whether it does.
+RAW_FIGURES = ("sigma", "if_sigma")
 COUNTS = ("missing", "outliers", "clipped")
 DYNAMIC = (
     "error_mean",
@@ -90,8 +92,8 @@ FACTOR_WORDS = (
     f"low-passed to one bandwidth, the fitted N, and the floor of the Allan curve. {LIMITS}"
 )
 BAND_WORDS = (
-    f"Marked “{BAND_LIMITED}”: the method's low-pass lowers this reading by itself, it is no measure of its noise. N "
-    "is fitted with the filter's shape and may be compared."
+    f"Marked “{BAND_LIMITED}”: the method's low-pass changes this reading by itself, it is no measure of its noise and "
+    "never the best. N is fitted with the filter's shape and may be compared."
 )
 RESPONSE_WORDS = (
     "Bandwidth and delay are the method's own, without the gyro's; “not limited”: it passes what the gyro passes."
@@ -112,7 +114,7 @@ def rest_tables(dataset: DatasetPart, array: ArrayPart) -> Markup:
     if array.methods() and any(_known(values, name) for name, _ in IMPROVEMENT):
         factors = _figures(dataset, array, values, IMPROVEMENT, f"Improvement {where}", gyros=False)
         parts = [factors, paragraph(FACTOR_WORDS, "note")]
-    marked = any(value.note.startswith(BAND_LIMITED) for known in values.values() for value in known.values())
+    marked = any(map(_narrow, array.methods()))
     return join(
         *parts,
         _figures(dataset, array, values, ACCURACY, f"Accuracy {where}"),
@@ -164,17 +166,29 @@ def _figures(
 
     def of_method(method: Mapping[str, Any]) -> list[Cell]:
         name = (method["method"], method["definition"])
-        known = values.get(name, {})
-        return [figure_cell(known.get(metric), metric, notes, best=best[metric] == name) for metric, _ in metrics]
+        known, narrow = values.get(name, {}), _narrow(method)
+        return [
+            figure_cell(
+                known.get(metric), metric, notes, best=best[metric] == name, limited=narrow and metric in RAW_FIGURES
+            )
+            for metric, _ in metrics
+        ]
 
-    rows = _rows(array, of_gyro if gyros else None, of_method, len(metrics), notes)
+    rows = _rows(array, of_gyro if gyros else None, of_method, len(metrics))
     return render_table(columns, rows, caption, notes.texts, compact=len(metrics) > MOST_WIDE)
 
 
 def _rows(
-    array: ArrayPart, of_gyro: Callable[[str], list[Cell]] | None, of_method: MakeCells, width: int, notes: Notes
+    array: ArrayPart,
+    of_gyro: Callable[[str], list[Cell]] | None,
+    of_method: MakeCells,
+    width: int,
+    notes: Notes | None = None,
 ) -> list[Row]:
-    """Gyros and methods under their headings; a method that did not run has one cell that says why."""
+    """Gyros and methods under their headings; a method that did not run has one cell that says why.
+
+    notes : takes the remarks on the methods, which one table of a recording gives
+    """
     methods = array.methods()
     rows: list[Row] = []
     if of_gyro is not None:
@@ -182,9 +196,8 @@ def _rows(
         rows += [Row(heading="Methods")] if methods else []
     for method in methods:
         if method["column"]:
-            first = Cell(
-                method["title"], method["definition"], notes=notes.number(method["note"]), hint=method["source"]
-            )
+            remark = notes.number(method["note"]) if notes else ()
+            first = Cell(method["title"], method["definition"], notes=remark, hint=method["source"])
             rows.append(Row((first, *of_method(method))))
         else:
             first = Cell(method["title"], method["definition"], hint=method["source"])
@@ -243,13 +256,20 @@ def _property(value: float) -> Cell:
     return Cell(significant(value))
 
 
+def _narrow(method: Mapping[str, Any]) -> bool:
+    """True if the method itself limits the bandwidth."""
+    return math.isfinite(float(method["bandwidth_hz"]))
+
+
 def _best(array: ArrayPart, values: Values, metric: str) -> tuple[str, str] | None:
-    """Method with the best value of a figure that has a better side."""
+    """Method with the best value of a figure that has a better side; a value that a low-pass lowers does not count."""
     sign = 1 if metric in HIGHER_IS_BETTER else -1 if metric in LOWER_IS_BETTER else 0
+    narrow = {(method["method"], method["definition"]) for method in array.methods() if _narrow(method)}
     found = {
         name: sign * known[metric].value
         for name, known in values.items()
         if sign and name[0] not in array.gyros and metric in known and known[metric].known
+        if not says_limited(known[metric]) and not (name in narrow and metric in RAW_FIGURES)
     }
     return max(found, key=found.__getitem__) if found else None
 

@@ -149,10 +149,10 @@ def cross_allan_plot(array: ArrayPart) -> Markup:
         curves.append(Curve(name, name, tau, value, low, high, colour=index, points=True, visible=shown))
     return curve_plot(
         f"cross-allan-{array.anchor}",
-        "Allan correlation of pairs of gyros",
+        "Allan covariance of pairs of gyros over their deviations",
         curves,
         Axis("averaging time τ, s", "log"),
-        Axis("Allan covariance / product of the deviations"),
+        Axis("Allan correlation"),
         summary=f"bars: limits; what two gyros share no average of them takes away{some}",
         levels=(0.0,),
         height=300,

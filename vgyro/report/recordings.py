@@ -24,7 +24,7 @@ COLUMNS = (
     Column("good", group="frames", hint="frames whose checksum and counter are right"),
     Column("bad", group="frames", hint="damaged frames, left out"),
     Column("lost", group="frames", hint="missing by the frame counter"),
-    Column("gaps", hint="interruptions; no figure bridges one"),
+    Column("gaps", hint="interruptions; nothing is put in their place"),
     Column("declared", "Hz", group="sample rate"),
     Column("measured", "Hz", group="sample rate"),
     Column("clipped or stuck channels", numeric=False),
