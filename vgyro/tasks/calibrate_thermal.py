@@ -34,6 +34,7 @@ from vgyro.units import parts_per_million
 
 SAME_TEMPERATURE = 2.0  # K
 FEWEST_ALIKE = 3
+FEWEST_TEMPERATURES = 4
 
 
 @dataclass(frozen=True)
@@ -223,8 +224,9 @@ def _bias_fit(
             problem = error
         else:
             return fit, tuple((float(t), float(b), name) for t, b in zip(warmth, bias, strict=True)), (name,)
-    if cycles.celsius is None:
-        raise problem or TooShort("no test at a known temperature")
+    if cycles.celsius is None or len(cycles.recordings) < FEWEST_TEMPERATURES:
+        words = f"no thermal recording, and fewer than {FEWEST_TEMPERATURES} tests on a rate table"
+        raise problem or TooShort(words)
     fit = fit_bias_temperature(cycles.temperature, cycles.bias, None, cycles.bias_error, confidence, reference_c)
     rows = zip(cycles.temperature, cycles.bias, cycles.recordings, strict=True)
     return fit, tuple((float(t), float(b), name) for t, b, name in rows), cycles.recordings
