@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.board import Board
-from vgyro.simulate import Twin, check_against_board, manifest_of, simulate_pieces, simulate_recording
+from vgyro.simulate import Twin, check_against_board, lasting, manifest_of, simulate_pieces, simulate_recording
 from vgyro.simulate.transfer import Direction
 
 LOOP = [0, 100, 200, 300, 200, 100, 0, -100, -200, -300, -200, -100, 0]
@@ -87,6 +87,14 @@ def test_a_sweep_of_the_chamber_carries_the_self_heating(quiet: Callable[..., Tw
     time = simulated.time
     chamber = -10 + 6 * np.clip(time - 2, 0, 10)
     assert simulated.temperature == pytest.approx(chamber + 4 * (1 - np.exp(-time / 5)))
+
+
+def test_a_longer_recording_has_a_slower_sweep(quiet: Callable[..., Twin]) -> None:
+    more = "temperature: {points: [[0, 20], [10, 60], [20, 20]], noise_k: 0.1}"
+    (recording,) = lasting(quiet("kind: thermal, duration_s: 20", more=more), 0.1).recordings
+    assert recording.temperature is not None
+    assert recording.temperature.points == ((0, 20), (180, 60), (360, 20))
+    assert recording.temperature.noise_k == 0.1
 
 
 def test_cross_axis_and_earth(quiet: Callable[..., Twin], board: Callable[[str], Board]) -> None:

@@ -273,8 +273,8 @@ def parse_twin(text: str, source: str) -> Twin:
 def lasting(twin: Twin, hours: float) -> Twin:
     """The twin with recordings at rest (static, thermal) of so many hours.
 
-    What happens in them keeps its place and its rate: faults and missing stretches are moved in proportion, and the
-    line hits as many bytes an hour as before.
+    What happens in them keeps its place and its rate: faults, missing stretches and the sweep of the chamber are moved
+    in proportion, and the line hits as many bytes an hour as before.
     """
     recordings = []
     for recording in twin.recordings:
@@ -289,10 +289,13 @@ def lasting(twin: Twin, hours: float) -> Twin:
             fault.model_copy(update={"start": fault.start * ratio, "stop": fault.stop and fault.stop * ratio})
             for fault in recording.faults
         )
+        thermal = temperature_of(twin, recording)
+        points = tuple((time * ratio, celsius) for time, celsius in thermal.points)
         changes = {
             "duration_s": hours * 3600,
             "faults": faults,
             "line": line.model_copy(update={**hits, "missing": missing}),
+            "temperature": thermal.model_copy(update={"points": points}) if points else recording.temperature,
         }
         recordings.append(recording.model_copy(update=changes))
     return twin.model_copy(update={"recordings": tuple(recordings)})
