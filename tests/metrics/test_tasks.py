@@ -219,3 +219,15 @@ def test_tones_and_covariances_of_the_gyros(tmp_path: Path, board: Board):
     # Known truth: common white noise of 0.02 in each of 0.1 and 0.02: covariance 4e-4/τ.
     other = (cross["gyro"] == gyros[2]) & (cross["other"] == gyros[3]) & (cross["tau"] == 1.0)
     assert cross["low"][other] < 4e-4 / (N**2 + 4e-4) < cross["high"][other]
+
+
+def test_noise_of_a_recording_full_of_short_losses(tmp_path: Path, board: Board):
+    # Every twentieth sample lost: no run is longer than 0.4 s, yet the noise is that at rest, and so is its correlation.
+    number = len(gyros_of(board))
+    rate = white(20_000, number) + N * math.sqrt(RATE_HZ) * np.random.default_rng(8).standard_normal((20_000, 1))
+    write_rates(tmp_path, board, rate, np.arange(20_000) % 20 != 0)
+    record = run_noise(tmp_path, board)
+    assert record["method"] == "samples at rest"
+    for gyro in gyros_of(board):
+        assert record["arw"][gyro] == pytest.approx(math.sqrt(2) * N, rel=0.03)
+    assert record["correlation"][0][1] == pytest.approx(0.5, abs=0.03)

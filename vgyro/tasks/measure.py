@@ -156,14 +156,15 @@ def noise_correlation(
     gyros: FileColumns, frame: ArrayFile, reference: np.ndarray | None, options: MetricsOptions
 ) -> Correlation:
     """Correlation of the noise at rest; of the errors where the board moves and the true rate is known; else NaN."""
-    rest = frame.rest_segment()
-    if rest.size:
+    if frame.at_rest.any():
+        rest = frame.rest_sampling(options.most_lost_s)
+        segment = rest.segment
 
         def cleaned(rate: np.ndarray) -> np.ndarray:
-            return without_outliers(rate, frame.rate_hz, rest, options.outlier_threshold)[0]
+            return without_outliers(rate, frame.rate_hz, segment, options.outlier_threshold)[0]
 
         columns = replace(gyros, where=frame.at_rest, cleaned=cleaned)
-        return correlation_matrix(columns, frame.rate_hz, rest, options.confidence)
+        return correlation_matrix(columns, frame.rate_hz, rest.stretch, options.confidence)
     if reference is not None and np.isfinite(reference).sum() > len(gyros):
         known = np.isfinite(reference)
         moving = replace(gyros, where=known)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,12 @@ from vgyro.config import MetricsOptions
 from vgyro.metrics import (
     Coefficient,
     NoiseCoefficients,
+    Sampling,
     allan_deviation,
     correlation_matrix,
     noise_coefficients,
     noise_from_differences,
     read_curve,
-    stretches,
     without_outliers,
 )
 from vgyro.storage.tables import write_json
@@ -54,27 +53,25 @@ def main(task: Task) -> None:
     path = task.inputs["rates"][0]
     frame = read_array(path, [], task.options["axis"])
     places = [(path, gyro) for gyro in gyros]
-    if rests_enough(frame):
-        found = noise_at_rest(places, frame, options, engine)
+    sampling = frame.rest_sampling(options.most_lost_s)
+    if rests_enough(sampling):
+        found = noise_at_rest(FileColumns(places, frame.at_rest), sampling, options, engine)
     else:
         found = noise_in_motion(FileColumns(places), frame, engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
 
 
-def rests_enough(array: ArrayFile) -> bool:
+def rests_enough(sampling: Sampling) -> bool:
     """Is there rest enough to see the noise in, one stretch of it long enough for an Allan curve?"""
-    lengths = [stop - start for start, stop in stretches(array.rest_segment())]
-    return sum(lengths) >= ENOUGH_REST_S * array.rate_hz and max(lengths) >= LONG_ENOUGH
+    longest = int(np.bincount(sampling.stretch).max(initial=0))
+    return len(sampling) >= ENOUGH_REST_S * sampling.rate_hz and longest >= LONG_ENOUGH
 
 
-def noise_at_rest(
-    places: list[tuple[Path, str]], frame: ArrayFile, options: MetricsOptions, engine: str
-) -> ArrayNoiseRecord:
-    """From the samples at rest of the gyros at `places`, without outliers; averages go over short losses alone."""
-    sampling = frame.rest_sampling(options.most_lost_s)
-    segment, rate_hz = sampling.segment, frame.rate_hz
+def noise_at_rest(gyros: FileColumns, sampling: Sampling, options: MetricsOptions, engine: str) -> ArrayNoiseRecord:
+    """From the samples at rest, the only ones of `gyros`, without outliers; averages go over short losses alone."""
+    segment, rate_hz = sampling.segment, sampling.rate_hz
     fits, read = [], []
-    for rate in FileColumns(places, frame.at_rest):
+    for rate in gyros:
         outliers = without_outliers(rate, rate_hz, segment, options.outlier_threshold)[1]
         curve = allan_deviation(
             rate[~outliers], rate_hz, None, None, options.confidence, engine, options.taus_per_octave,
@@ -86,8 +83,8 @@ def noise_at_rest(
     def cleaned(rate: np.ndarray) -> np.ndarray:
         return without_outliers(rate, rate_hz, segment, options.outlier_threshold)[0]
 
-    columns = FileColumns(places, frame.at_rest, cleaned=cleaned)
-    correlation = correlation_matrix(columns, rate_hz, frame.rest_segment(), options.confidence).value
+    columns = replace(gyros, cleaned=cleaned)
+    correlation = correlation_matrix(columns, rate_hz, sampling.stretch, options.confidence).value
     return ArrayNoiseRecord("samples at rest", len(segment) / rate_hz, fits, read, correlation)
 
 

@@ -60,13 +60,6 @@ class ArrayFile:
         sampling = self.sampling(most_lost_s)
         return sampling if self.at_rest.all() else sampling.without(~self.at_rest)
 
-    def rest_segment(self) -> np.ndarray:
-        """Number [R] of the stretch, at rest and without a gap, of each sample at rest."""
-        breaks = np.empty(len(self.at_rest), dtype=bool)
-        breaks[:1] = self.at_rest[:1]
-        breaks[1:] = (self.at_rest[1:] != self.at_rest[:-1]) | (self.segment[1:] != self.segment[:-1])
-        return np.cumsum(breaks, dtype=np.int32)[self.at_rest]
-
 
 def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
     """Columns of `gyros` from rates.parquet.  raises : DataError if the sample rate is not known"""
