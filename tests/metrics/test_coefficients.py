@@ -98,8 +98,8 @@ def test_the_gyros_own_low_pass_is_noticed():
 
 
 def test_quantisation_is_noticed():
-    # Rounding the angle adds 3Q²/τ² with Q = step/√12, the s.d. of a uniform number (IEEE Std 952-1997): the angle moves
-    # by half a step between samples, so that the errors are independent. N must stay.
+    # Rounding the angle adds 3Q²/τ² with Q = step/√12, the s.d. of a uniform number (IEEE Std 952-1997), where the
+    # angle moves by half a step between samples, so that the errors are independent. N must stay.
     rng = np.random.default_rng(4)
     angle = np.cumsum(N * np.sqrt(100.0) * rng.standard_normal(200_000)) / 100
     step = 0.02

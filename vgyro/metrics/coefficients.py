@@ -129,10 +129,10 @@ def _at_short_tau(curve: Curve, constant: float, drawing: Drawing) -> tuple[Mode
         start = _first_fitting(low_passed, curve)
         if fit(low_passed.since(start), curve.since(start))[-1] < 0:
             return low_passed.since(start), start
-    base = base.since(start)
-    if chance_of_gain(base, "Q", curve.since(start), drawing) <= EVIDENCE:
-        return base.with_terms("Q"), start
-    return Model(BASE, curve.tau[first:]), first
+    if chance_of_gain(base.since(start), "Q", curve.since(start), drawing) <= EVIDENCE:
+        return base.since(start).with_terms("Q"), start
+    first = max(first, start)
+    return base.since(first), first
 
 
 def _first_fitting(model: Model, curve: Curve) -> int:
