@@ -11,16 +11,15 @@ import numpy as np
 from vgyro import engine as engines
 from vgyro.errors import TooShort
 from vgyro.metrics.noise_type import noise_exponents
-from vgyro.metrics.robust import robust_differences, robust_edf, without_outliers
+from vgyro.metrics.robust import robust_differences, robust_edf, without_far_off
 from vgyro.metrics.sampling import Sampling
-from vgyro.metrics.slots import SlotSums
+from vgyro.metrics.slots import SINGLE, SlotSums, variance_of_samples
 
 TAUS_PER_OCTAVE = 3
 LONGEST_TAU = 3  # the longest τ is a third of the longest segment
 LONGEST = {"overlapping": LONGEST_TAU, "modified": 4, "hadamard": 4, "robust": LONGEST_TAU}
 KINDS = tuple(LONGEST)
 LEAST_USED = 0.1  # of the differences: a τ at which losses leave fewer is left out
-SINGLE = np.array([1, 2, 4, 8])  # averaging factors that the variance of single samples is read from
 
 
 @dataclass(frozen=True)
@@ -96,11 +95,10 @@ def allan_deviation(
         raise ValueError(f"unknown kind {kind!r}: {', '.join(KINDS)}")
     rate = np.asarray(rate, dtype=float)
     if kind == "robust":
-        rate, sampling = without_outliers(rate, rate_hz, sampling, segment)
+        rate, sampling = without_far_off(rate, rate_hz, sampling, segment)
     allan = engines.get(engine).allan
     series = _series(rate, segment, sampling, allan, kind)
-    lengths, alike = np.unique(np.diff(series.edges), return_counts=True)
-    longest = int(lengths.max(initial=0))
+    longest = int(np.diff(series.edges).max(initial=0))
     factors = averaging_factors(rate_hz, longest, taus, per_octave, LONGEST[kind])
     if factors.size == 0:
         raise TooShort(
@@ -113,14 +111,9 @@ def allan_deviation(
         raise TooShort("lost samples leave too few differences at every τ", remedy="Look for a less damaged recording")
     factors, variance, share = factors[kept], variance[kept], share[kept]
     exponent = noise_exponents(rate, series.edges, factors, allan, series.sums)
-    edf = np.empty(factors.size)
-    for row, (m, alpha) in enumerate(zip(factors.tolist(), exponent.tolist(), strict=True)):
-        used = lengths >= LONGEST[kind] * m
-        estimator = "overlapping" if kind == "robust" else kind
-        freedom = allan.degrees_of_freedom(alpha, m, lengths[used], estimator)
-        edf[row] = np.sum(alike[used] * freedom) * share[row]
+    edf = _freedom(series, factors, exponent, share, allan, kind)
     if kind == "robust":
-        variance, edf = robust_edf(variance, edf, factors, longest)
+        variance, edf = robust_edf(variance, edf, factors, int(series.edges[-1]))
     deviation = np.sqrt(variance)
     low, high = allan.limits(deviation, edf, confidence)
     return AllanCurve(factors / rate_hz, deviation, low, high, edf, exponent, confidence, kind)
@@ -155,15 +148,17 @@ def _variances(series: _Series, factors: np.ndarray, allan: ModuleType, kind: st
     return np.maximum(squares / some - single * excess / some, 0.0), counts / np.maximum(possible, 1)
 
 
-def variance_of_samples(variance: np.ndarray, known: np.ndarray) -> float:
-    """Variance of a single sample about the mean of 16, from the Allan variances of 1, 2, 4, 8 samples.
-
-    variance, known : arrays [4]; where the longer ones are not known, about the mean of fewer
-    Each halving of a block adds half the Allan variance of its halves to the variance about the block's mean.
-    """
-    halvings = int(np.argmin(np.append(known, False)))
-    block = 2**halvings
-    return float(variance[:halvings].sum() / 2 * block / (block - 1)) if halvings else 0.0
+def _freedom(
+    series: _Series, factors: np.ndarray, exponent: np.ndarray, share: np.ndarray, allan: ModuleType, kind: str
+) -> np.ndarray:
+    """Degrees of freedom [M]: those of all stretches that are long enough, times the share of the differences."""
+    lengths, alike = np.unique(np.diff(series.edges), return_counts=True)
+    estimator = "overlapping" if kind == "robust" else kind
+    edf = np.empty(factors.size)
+    for row, (m, alpha) in enumerate(zip(factors.tolist(), exponent.tolist(), strict=True)):
+        used = lengths >= LONGEST[kind] * m
+        edf[row] = np.sum(alike[used] * allan.degrees_of_freedom(alpha, m, lengths[used], estimator))
+    return edf * share
 
 
 def averaging_factors(

@@ -6,7 +6,7 @@ import numpy as np
 
 from vgyro.metrics.outliers import find_outliers
 from vgyro.metrics.sampling import Sampling
-from vgyro.metrics.slots import SlotSums
+from vgyro.metrics.slots import SINGLE, SlotSums, variance_of_samples
 
 THRESHOLD = 6.0  # scales from the level: one in 5e8 samples of Gaussian noise
 MEDIAN_OF_SQUARE = 0.454936423119573  # median of chi² with one degree of freedom
@@ -18,7 +18,7 @@ median, least of the exponents 2 … -2. Of independent differences it is 0.37; 
 """
 
 
-def without_outliers(
+def without_far_off(
     rate: np.ndarray, rate_hz: float, sampling: Sampling | None = None, segment: np.ndarray | None = None
 ) -> tuple[np.ndarray, Sampling]:
     """The samples but for the outliers, and when they were taken.
@@ -36,13 +36,11 @@ def robust_differences(sums: SlotSums, factors: np.ndarray, share: int) -> tuple
 
     factors : array [M] int;  share : stretches of less than share·m slots are left out
     returns : variance [M] (deg/s)², share [M]
-    Heavy stretches that a twentieth of the differences touch raise it by less than a tenth. Losses as in
+    Heavy stretches that a twentieth of the differences touch raise it by no more than an eighth. Losses as in
     allan_deviation.
     """
-    singles = [_median(sums, m, 2)[0] for m in (1, 2, 4, 8)]
-    known = np.isfinite(singles)
-    halvings = int(np.argmin(np.append(known, False)))
-    single = sum(singles[:halvings]) / 2 * 2**halvings / max(2**halvings - 1, 1)
+    singles = np.array([_median(sums, m, 2)[0] for m in SINGLE.tolist()])
+    single = variance_of_samples(singles, np.isfinite(singles))
     found = np.array([_median(sums, m, share) for m in factors.tolist()]).reshape(-1, 3)
     return np.maximum(np.nan_to_num(found[:, 0] - single * found[:, 1]), 0.0), found[:, 2]
 
@@ -50,7 +48,7 @@ def robust_differences(sums: SlotSums, factors: np.ndarray, share: int) -> tuple
 def robust_edf(variance: np.ndarray, edf: np.ndarray, factors: np.ndarray, slots: int) -> tuple[np.ndarray, np.ndarray]:
     """Variance [M] without the bias of a median of few, and degrees of freedom [M] of it, from those of the mean.
 
-    slots : of the longest stretch
+    slots : of all stretches
     A median of n independent chi² is too large by 1.98/(n + 2) of it (second order in 1/n); n is edf over 0.37.
     """
     efficiency = np.where(factors == 1, EFFICIENCY[1], EFFICIENCY[2])

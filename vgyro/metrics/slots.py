@@ -9,6 +9,8 @@ import numpy as np
 
 PRESENT_TENTHS = 9
 """A mean counts where so many tenths of its samples are there."""
+SINGLE = np.array([1, 2, 4, 8])
+"""Averaging factors that the variance of single samples is read from."""
 MOST_BLOCKS = 1 << 20
 PIECE = 1 << 12
 
@@ -75,6 +77,17 @@ class SlotSums:
         means = (self.total[at + factor] - self.total[at])[good] / have[good]
         apart = (np.diff(at[good]) != factor) | (np.diff(stretch[good]) != 0)
         return means, np.concatenate([[0], np.flatnonzero(apart) + 1, np.full(int(len(means) > 0), len(means))])
+
+
+def variance_of_samples(variance: np.ndarray, known: np.ndarray) -> float:
+    """Variance of a single sample about the mean of 16, from the Allan variances of SINGLE samples.
+
+    variance, known : arrays [4]; where the longer ones are not known, about the mean of fewer
+    Each halving of a block adds half the Allan variance of its halves to the variance about the block's mean.
+    """
+    halvings = int(np.argmin(np.append(known, False)))
+    block = 2**halvings
+    return float(variance[:halvings].sum() / 2 * block / (block - 1)) if halvings else 0.0
 
 
 def _at(values: np.ndarray, edges: np.ndarray, number: np.ndarray, stride: int, offset: int) -> np.ndarray:

@@ -93,6 +93,7 @@ VG_INLINE void VG(allan_lossy_step)(const double *x, const int32_t *n, size_t m,
     *used -= valid;
 }
 
+/* `count` differences of one stretch; where none of a block's samples is lost they are plain ones. */
 VG_INLINE int64_t VG(allan_lossy_stretch)(const double *x, const int32_t *n, size_t m, size_t stride, int order,
                                           size_t count, double need, double *squares, double *excess) {
     const m4 lane = {0, 1, 2, 3}, none = {0, 0, 0, 0};
@@ -100,7 +101,14 @@ VG_INLINE int64_t VG(allan_lossy_stretch)(const double *x, const int32_t *n, siz
     for (size_t k = 0; k < count;) {
         v4 s = v4_set(0), e = v4_set(0);
         m4 used = none;
-        size_t stop = k + VG_ALLAN_BLOCK < count ? k + VG_ALLAN_BLOCK : count;
+        size_t stop = k + VG_ALLAN_BLOCK < count ? k + VG_ALLAN_BLOCK : count, reach = stop - 1 + (size_t)order * m;
+        if (stride == 1 && (size_t)(n[reach] - n[k]) == reach - k) {
+            double sum = order == 2 ? VG(allan_sum_2)(x + k, m, stop - k) : VG(allan_sum_3)(x + k, m, stop - k);
+            *squares += sum / ((double)m * (double)m);
+            total += (int64_t)(stop - k);
+            k = stop;
+            continue;
+        }
         for (; k + 4 <= stop; k += 4)
             VG(allan_lossy_step)(x + k * stride, n + k * stride, m, stride, order, ~none, need, &s, &e, &used);
         for (; k < stop; k++) {
