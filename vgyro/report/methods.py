@@ -76,7 +76,7 @@ LOWER_IS_BETTER = (
     "angle_drift_60s",
 )
 PROPERTIES = (
-    Column("causal", numeric=False, hint="sample t uses nothing later than t", group="response of the method"),
+    Column("causal", numeric=False, hint="sample t uses nothing later than t; no: offline only", group="response of the method"),
     Column("DC gain", "1", hint="gain for a constant rate", group="response of the method"),
     Column("−3 dB bandwidth", "Hz", group="response of the method"),
     Column("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group="response of the method"),
@@ -242,7 +242,7 @@ def _count(value: Value | None) -> Cell:
 def _answers(method: Mapping[str, Any]) -> list[Cell]:
     limited = [_property(float(method[name])) for name in ("bandwidth_hz", "noise_bandwidth_hz")]
     return [
-        Cell("yes" if method["causal"] else "no, offline"),
+        Cell("yes" if method["causal"] else "no"),
         Cell(significant(float(method["dc_gain"]))),
         *limited,
         Cell(significant(float(method["delay_s"]))),

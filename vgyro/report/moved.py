@@ -68,7 +68,7 @@ def _unchanged(methods: Any) -> list[Markup]:
         if reason and reason != method["column"]:
             title = f"{method['title']} ({method['definition']})" if method["definition"] else method["title"]
             reasons.setdefault(reason, []).append(title)
-    return [paragraph(f"{', '.join(titles)}: {reason}.", "note") for reason, titles in reasons.items()]
+    return [paragraph(f"{'; '.join(titles)}: {reason}.", "note") for reason, titles in reasons.items()]
 
 
 def _pair(
