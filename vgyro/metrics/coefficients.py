@@ -74,12 +74,13 @@ def noise_coefficients(
     returns      : NoiseCoefficients, NaN with a note where the curve has fewer than 3 points
     raises       : ValueError for a modified or Hadamard deviation, whose terms have other shapes
     Reweighted non-negative least squares on σ², weight edf/2; its scatter for N, B and K is near the Cramér-Rao bound.
-    Q and R are in the model if chance_of_gain is at most 0.005 (6 points at least): of series without them about one in
-    a hundred, or less, shows one. A ramp is told from a random walk only where it is far larger over the whole series;
-    a smaller one is in K. Limits: Limits.
+    Q and R are in the model if chance_of_gain is at most 0.005 (of series without them about one in a hundred, or less,
+    shows one), the model with them describes the curve, and it has 6 points. A ramp is told from a random walk only
+    where it is far larger over the whole series; a smaller one is in K. Limits: Limits.
     Without a bandwidth, where the shortest τ do not fit the rest, a term in 1/τ² of either sign is tried: negative is a
-    low-pass of the gyro itself (-3TcN²/2τ²), which hides any Q; the τ that still do not fit are left out.
-    Where Q cannot be told from a low-pass, its upper limit is what the curve has room for: 3Q²/τ² <= σ² at every τ.
+    low-pass of the gyro itself (-3TcN²/2τ²); positive is Q if every τ then fits, else noise that has no name, as of a
+    tone. The τ that still do not fit are left out. Where Q cannot be told from those, its upper limit is what the curve
+    has room for: 3Q²/τ² <= σ² at every τ.
     Model: IEEE Std 952-1997, annex C.  Low-pass: first-order Gauss-Markov rate, Tc = 1/(2π·bandwidth).
     """
     if curve.kind not in FITTED_KINDS:
@@ -102,37 +103,47 @@ def noise_coefficients(
     found = {term: (float(squares[at]), *limits.of(term)) for at, term in enumerate(model.terms) if term != FREE}
     for term in set("QR") - set(model.terms):
         found[term] = 0.0, 0.0, _largest_unseen(term, limits, curve.high[used] ** 2, whole, identified=first == 0)
-    expected = model.at(squares, fitted.variance)
-    misfit = float(np.mean((fitted.variance - expected) ** 2 * fitted.edf / (2 * expected**2)))
+    misfit = _misfit(model, squares, fitted)
     result = {term: Coefficient(*(math.sqrt(value) / dc_gain for value in three)) for term, three in found.items()}
     tau_from = float(fitted.tau[0])
-    note = _note(model, tau_from if first or constant else None, misfit)
+    note = _note(model, squares, tau_from if first or constant else None, misfit)
     return NoiseCoefficients(**result, tau_from=tau_from, misfit=misfit, note=note)
 
 
 def _describe(curve: Curve, constant: float, drawing: Drawing) -> tuple[Model, int]:
     """The model that describes the curve from the first τ, of that index, on."""
     model, first = _at_short_tau(curve, constant, drawing)
-    curve = curve.since(first)
-    if len(curve.tau) >= FEWEST_POINTS and chance_of_gain(model, "R", curve, drawing) <= EVIDENCE:
-        model = model.with_terms("R")
-    return model, first
+    return (model.with_terms("R") if _shows(model, "R", curve.since(first), drawing) else model), first
 
 
 def _at_short_tau(curve: Curve, constant: float, drawing: Drawing) -> tuple[Model, int]:
     base = Model(BASE, curve.tau, constant)
     if constant or len(curve.tau) < FEWEST_POINTS:
         return base, 0
-    first = start = _first_fitting(base, curve)
-    if first:
-        low_passed = base.with_terms(FREE)
-        start = _first_fitting(low_passed, curve)
-        if fit(low_passed.since(start), curve.since(start))[-1] < 0:
-            return low_passed.since(start), start
-    if chance_of_gain(base.since(start), "Q", curve.since(start), drawing) <= EVIDENCE:
-        return base.since(start).with_terms("Q"), start
+    first, free = _first_fitting(base, curve), base.with_terms(FREE)
+    start = _first_fitting(free, curve) if first else 0
+    if start == 0 and _shows(base, "Q", curve, drawing):
+        return base.with_terms("Q"), 0
+    if first == 0:
+        return base, 0
+    free, later = free.since(start), curve.since(start)
+    if fit(free, later)[-1] < 0 or chance_of_gain(base.since(start), "Q", later, drawing) <= EVIDENCE:
+        return free, start
     first = max(first, start)
     return base.since(first), first
+
+
+def _shows(model: Model, term: str, curve: Curve, drawing: Drawing) -> bool:
+    """Is a further term needed, and does the model with it describe the curve?"""
+    if len(curve.tau) < FEWEST_POINTS or chance_of_gain(model, term, curve, drawing) > EVIDENCE:
+        return False
+    wide = model.with_terms(term)
+    return _misfit(wide, fit(wide, curve), curve) <= LARGEST_MISFIT
+
+
+def _misfit(model: Model, squares: np.ndarray, curve: Curve) -> float:
+    expected = model.at(squares, curve.variance)
+    return float(np.mean((curve.variance - expected) ** 2 * curve.edf / (2 * expected**2)))
 
 
 def _first_fitting(model: Model, curve: Curve) -> int:
@@ -162,12 +173,13 @@ def _largest_unseen(term: str, limits: Limits, highest: np.ndarray, whole: Curve
     return min(wider.upper(term), room)
 
 
-def _note(model: Model, late: float | None, misfit: float) -> str:
+def _note(model: Model, squares: np.ndarray, late: float | None, misfit: float) -> str:
     notes = [] if late is None else [f"fitted from τ = {late:.3g} s"]
     if FREE in model.terms:
-        notes.append("with a term 1/τ² for the gyro's own low-pass")
+        kind = "the gyro's own low-pass" if squares[-1] < 0 else "a tone or other noise of the angle"
+        notes.append(f"with a term 1/τ² for {kind}")
     if "Q" in model.terms:
-        notes.append("with a term 1/τ² for noise of the angle (quantisation, a tone)")
+        notes.append("with a term 1/τ² for noise of the angle (quantisation)")
     if "R" in model.terms:
         notes.append("with a term τ² for a ramp of the rate")
     if misfit > LARGEST_MISFIT:
