@@ -75,13 +75,14 @@ LOWER_IS_BETTER = (
     "error_sigma_scaled",
     "angle_drift_60s",
 )
+RESPONSE = "response of the method"
 PROPERTIES = (
-    Column("causal", numeric=False, hint="sample t uses nothing later than t; no: offline only", group="response of the method"),
-    Column("DC gain", "1", hint="gain for a constant rate", group="response of the method"),
-    Column("−3 dB bandwidth", "Hz", group="response of the method"),
-    Column("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group="response of the method"),
-    Column("delay", "s", hint="at low frequency", group="response of the method"),
-    Column("known", numeric=False, hint="how the four are known", group="response of the method"),
+    Column("causal", numeric=False, hint="sample t uses nothing later than t; no: offline only", group=RESPONSE),
+    Column("DC gain", "1", hint="gain for a constant rate", group=RESPONSE),
+    Column("−3 dB bandwidth", "Hz", group=RESPONSE),
+    Column("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group=RESPONSE),
+    Column("delay", "s", hint="at low frequency", group=RESPONSE),
+    Column("known", numeric=False, hint="how the four are known", group=RESPONSE),
 )
 MOST_WIDE = 7
 LIMITS = "Below each figure: its limits."
