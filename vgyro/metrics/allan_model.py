@@ -93,11 +93,16 @@ class Model:
 
 
 def fit(
-    model: Model, curve: Curve, held: tuple[int, float] | None = None, start: np.ndarray | None = None
+    model: Model,
+    curve: Curve,
+    held: tuple[int, float] | None = None,
+    start: np.ndarray | None = None,
+    settled: float = SETTLED,
 ) -> np.ndarray:
     """Squares of the coefficients [C] by reweighted non-negative least squares on σ², weight edf / (2·model²).
 
     held    : column and value of a square that is not fitted;  start : squares [C] to take the first weights from
+    settled : relative change of the model from pass to pass at which it ends
     The weights come from the model and not from the data, or low points would pull it down.
     """
     keep = [term for term in range(len(model.terms)) if held is None or term != held[0]]
@@ -113,7 +118,7 @@ def fit(
     for _ in range(PASSES):
         squares[keep] = solve(columns, targets, curve.edf / (2 * scale**2), bounded)[0][0]
         following = model.at(squares, curve.variance)
-        if (np.abs(following - scale) <= SETTLED * scale).all():
+        if (np.abs(following - scale) <= settled * scale).all():
             break
         scale = following
     return squares

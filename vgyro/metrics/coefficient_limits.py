@@ -10,8 +10,9 @@ import numpy as np
 
 from vgyro.metrics.allan_model import Curve, Model, fit, solve
 
-STEPS_OF_BISECTION = 7
-FIRST_STEP = 0.01
+FIRST_STEP, MOST_STEPS = 0.01, 30  # relative, twice as long each time
+STEPS_OF_BISECTION = 4
+NEARLY_SETTLED = 1e-6  # relative change of the model from pass to pass that is enough for a limit
 NEARLY_NORMAL = 30.0  # degrees of freedom from which the cube root of chi² is taken as normal
 TRUST = 0.01  # relative error of σ² that the model itself may have: no evidence is drawn from less
 
@@ -121,7 +122,7 @@ class Limits:
         """Share of the draws with this value in which less is found; half of the ties count."""
         index = self.model.terms.index(term)
         found = float(self.squares[index])
-        refitted = fit(self.model, self.curve, (index, value), self.squares)
+        refitted = fit(self.model, self.curve, (index, value), self.squares, NEARLY_SETTLED)
         expected = self.model.at(refitted, self.curve.variance)
         weights = self.curve.edf / (2 * expected**2)
         drawn = solve(self.model.columns, self.errors * expected, weights, self.model.bounded)[0][:, index]
@@ -131,16 +132,20 @@ class Limits:
 
 def _crossing(share_below: Callable[[float], float], start: float, level: float, up: bool) -> float:
     """The value at which the share of draws below the value found falls through `level`."""
-    step, near, far = FIRST_STEP, start, start
-    for _ in range(30):
-        far = near * (1 + step) if up else near / (1 + step)
-        if (share_below(far) < level) == up:
+    step, near = FIRST_STEP, (start, share_below(start))
+    for _ in range(MOST_STEPS):
+        value = near[0] * (1 + step) if up else near[0] / (1 + step)
+        far = value, share_below(value)
+        if (far[1] < level) == up:
             break
         near, step = far, 2 * step
     for _ in range(STEPS_OF_BISECTION):
-        middle = math.sqrt(near * far)
-        if (share_below(middle) < level) == up:
+        value = math.sqrt(near[0] * far[0])
+        middle = value, share_below(value)
+        if (middle[1] < level) == up:
             far = middle
         else:
             near = middle
-    return math.sqrt(near * far)
+    # Straight between the two, as the share is a step function of no exact crossing.
+    part = (near[1] - level) / (near[1] - far[1]) if near[1] != far[1] else 1.0
+    return near[0] * (far[0] / near[0]) ** min(max(part, 0.0), 1.0)
