@@ -85,7 +85,7 @@ def test_what_the_conversion_applies_is_said_for_every_gyro(dataset: DatasetPart
 
 def test_the_residuals_of_both_directions_are_apart(dataset: DatasetPart) -> None:
     html = certificate_plots("x", {"g1": dataset.calibration["gyros"]["g1"]})
-    assert re.findall(r'data-series="(g1 \w+)"', html) == ["g1 up", "g1 down", "g1 cubic"]
+    assert re.findall(r'data-series="(g1 \w+)"', html) == ["g1 up", "g1 down", "g1 polynomial"]
     first = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html, re.S).group(1))
     markers = re.findall(r'"marker": \{"type": "value", "value": "(\w+)"\}', json.dumps(first))
     assert markers == ["triangle", "inverted_triangle"]

@@ -61,13 +61,12 @@ def _head(dataset: DatasetPart, axis: str, gyros: Mapping[str, Record], test: Re
     manifest = dataset.manifest
     twin = f" (twin {manifest.twin})" if manifest.twin else ""
     confidence = (dataset.options.get("calibration") or {}).get("confidence")
-    recordings = test.get("recordings") or list(dict.fromkeys(_recording(record) for record in gyros.values()))
     pairs = [
         ("object", f"{names}, axis {axis}: {whose}"),
         ("data", f"SIMULATED{twin}: a model was calibrated, not a device" if manifest.simulated else "measured"),
         ("standard", str(test.get("standard") or NOT_GIVEN)),
         ("method", METHOD),
-        ("recordings", ", ".join(map(str, recordings))),
+        ("recordings", _recordings(gyros, test)),
         ("rates", _rates(test)),
         ("temperature", _range(test["temperature_c"], "°C") if test.get("temperature_c") else "not logged"),
         ("Earth rate", _earth(test)),
@@ -76,8 +75,11 @@ def _head(dataset: DatasetPart, axis: str, gyros: Mapping[str, Record], test: Re
     return [(name, text) for name, text in pairs if text]
 
 
-def _recording(record: Record) -> str:
-    return str(record.get("recording") or NOT_GIVEN)
+def _recordings(gyros: Mapping[str, Record], test: Record) -> str:
+    main = list(dict.fromkeys(str(record.get("recording") or NOT_GIVEN) for record in gyros.values()))
+    others = [str(name) for name in test.get("recordings") or [] if name not in main]
+    more = f"; for repeatability and temperature also {', '.join(others)}" if others else ""
+    return ", ".join(main) + more
 
 
 def _rates(test: Record) -> str:
@@ -163,7 +165,7 @@ def _number(value: float | None) -> float:
 def applied(gyros: Mapping[str, Record]) -> list[str]:
     """What the conversion of the recordings does with this calibration, in sentences."""
     found = ["rate = sign · (count − zero-rate output) · scale factor, both as above."]
-    compensated: dict[str, list[str]] = {}
+    compensated: dict[str, dict[str, list[str]]] = {}
     plain_ones: dict[str, list[str]] = {}
     for name, record in gyros.items():
         temperature = record.get("temperature")
@@ -172,15 +174,19 @@ def applied(gyros: Mapping[str, Record]) -> list[str]:
         elif temperature["applied"]:
             reference = significant(float(temperature["reference_c"]))
             limits = _range((temperature["low_c"], temperature["high_c"]), "°C")
-            words = f"by sensor {temperature['sensor']}, about {reference} °C, valid {limits}"
-            compensated.setdefault(words, []).append(name)
+            note = f"; {temperature['note']}" if temperature.get("note") else ""
+            compensated.setdefault(
+                f"reference {reference} °C, valid {limits}, outside held at the nearer end{note}", {}
+            ).setdefault(str(temperature["sensor"]), []).append(name)
         else:
             plain_ones.setdefault(str(temperature.get("note") or "switched off"), []).append(name)
-    found += [
-        f"Compensated for temperature {words}: zero-rate output by its cubic polynomial, scale factor by its slope, "
-        f"for {_names(names, gyros)}."
-        for words, names in compensated.items()
-    ]
+    for words, sensors in compensated.items():
+        names = [name for members in sensors.values() for name in members]
+        by = ", ".join(sensors)
+        found.append(
+            f"Compensated for temperature by {by}: zero-rate output by its polynomial, scale factor by its slope, for "
+            f"{_names(names, gyros)} ({words})."
+        )
     found += [
         f"Not compensated for temperature: {_names(names, gyros)} ({reason})." for reason, names in plain_ones.items()
     ]

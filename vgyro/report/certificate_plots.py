@@ -83,7 +83,9 @@ def _bias_plot(axis: str, gyros: Mapping[str, Record]) -> Markup:
         reference, scale = float(about["reference_c"]), float(record["scale"])
         polynomial = np.polynomial.Polynomial(np.array([0.0, *about["bias"][1:]]) * scale)
         at = np.linspace(float(about["low_c"]), float(about["high_c"]), CURVE_POINTS)
-        curves.append(Curve(f"{name} cubic", name, at, polynomial(at - reference), colour=index, group="polynomial"))
+        curves.append(
+            Curve(f"{name} polynomial", name, at, polynomial(at - reference), colour=index, group="polynomial")
+        )
         points = sorted(about["points"], key=lambda point: float(point["temperature_c"]))
         if points:
             temperature, bias = (_column(points, key) for key in ("temperature_c", "bias"))

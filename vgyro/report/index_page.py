@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from vgyro.report.best import FAIR
 from vgyro.report.html import badge, join, link, paragraph
 from vgyro.report.model import Record
 from vgyro.report.numbers import MISSING, duration, significant
@@ -87,4 +88,5 @@ def _best(best: Any) -> tuple[Cell, Cell]:
         limits = f"{significant(best['low'])} … {significant(best['high'])}"
     shown = best["low"] is None or best["low"] > 1
     factor = Cell(significant(best["value"]), limits, "" if shown else "muted", hint="" if shown else "not significant")
-    return Cell(best["label"], f"axis {best['axis']}, {best['recording']}"), factor
+    raw = "" if best["figure"] == FAIR else ", raw 1σ of full bandwidth"
+    return Cell(best["label"], f"axis {best['axis']}, {best['recording']}{raw}"), factor
