@@ -1,126 +1,151 @@
 """Scale factor and bias from plateaus: known truth, intervals, faults."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from rate_table import BIAS, LOOP, ONCE, SCALE, bent, fit, gyro, truth, turn
 from scipy.stats import linregress
 
-from vgyro.calibration import GyroNominal, average_plateaus, fit_scale_factor
+from vgyro.calibration import GyroNominal, PlateauMeans, cross_axis, fit_scale_factor
 from vgyro.errors import DataError, TooShort
 from vgyro.units import EARTH_RATE_DEG_H
 
-RATES = np.array([0, *range(25, 301, 25), *range(-25, -301, -25), 0], dtype=float)
-GYRO = GyroNominal("g1", 0.0153, 0.0, 1, 300.0)
-ERROR = 1.5  # counts, of a plateau mean
+WHITE = 0.022  # deg/s, of a plateau mean
+FEW = np.array([0.0, 100.0, -100.0, 0.0])
 
 
-def means(rng: np.random.Generator, scale: float = 0.0149, bias: float = 57.0, sign: int = 1) -> np.ndarray:
-    return (bias + sign * RATES / scale + ERROR * rng.standard_normal(RATES.size))[:, None]
-
-
-def fit(mean: np.ndarray, gyro: GyroNominal = GYRO, **options):
-    (found,) = fit_scale_factor(RATES, mean, np.full_like(mean, ERROR), [gyro], **options)
-    return found
+def exact(rates: np.ndarray = ONCE) -> PlateauMeans:
+    return turn(rates, np.random.default_rng(0), 1)
 
 
 def test_exact_line():
-    (found,) = fit_scale_factor(RATES, (57.0 + RATES / 0.0149)[:, None], np.zeros((RATES.size, 1)), [GYRO])
-    assert (found.source, found.scale, found.bias) == ("measured", pytest.approx(0.0149), pytest.approx(57.0))
+    (found,) = fit(exact())
+    assert (found.source, found.scale, found.bias) == ("measured", pytest.approx(SCALE), pytest.approx(BIAS))
     assert found.nonlinearity_ppm == pytest.approx(0, abs=1e-6)
-    assert found.floor_ppm == 0
+    assert found.floor_ppm == pytest.approx(0, abs=1e-4)
+    assert {name: finding.state for name, finding in found.figures.items()} == {
+        **dict.fromkeys(
+            ("nonlinearity_full_scale", "nonlinearity_reading", "nonlinearity_rms", "asymmetry", "zero_shift"),
+            "below the floor",
+        ),
+        "hysteresis": "not measured",
+    }
 
 
-def test_equals_scipy():
-    mean = means(np.random.default_rng(1))
-    found, theirs = fit(mean), linregress(RATES, mean[:, 0])
+def test_few_plateaus_equal_scipy():
+    # Four plateaus leave no room for more than a line: ordinary least squares, t with 2 degrees of freedom, 4.3027.
+    means = turn(FEW, np.random.default_rng(1), 1, white=WHITE)
+    (found,), theirs = fit(means), linregress(FEW, means.mean[:, 0])
     assert found.scale == pytest.approx(1 / theirs.slope, rel=1e-12)
     assert found.bias == pytest.approx(theirs.intercept, rel=1e-12)
-    # Half-width of the slope: t with 24 degrees of freedom, 2.0639.
-    assert 1 / found.scale_low - theirs.slope == pytest.approx(2.0639 * theirs.stderr, rel=1e-4)
-    assert found.bias_high - theirs.intercept == pytest.approx(2.0639 * theirs.intercept_stderr, rel=1e-4)
+    assert 1 / found.scale_low - theirs.slope == pytest.approx(4.3027 * theirs.stderr, rel=1e-4)
+    assert found.bias_high - theirs.intercept == pytest.approx(4.3027 * theirs.intercept_stderr, rel=1e-4)
+    assert found.scale_error == pytest.approx(theirs.stderr / theirs.slope**2, rel=1e-6)
+    assert found.figures["nonlinearity_rms"].state == "not measured"
 
 
-def test_intervals_cover_the_truth():
-    rng = np.random.default_rng(2)
-    fits = [fit(means(rng)) for _ in range(400)]
-    scale = sum(found.scale_low <= 0.0149 <= found.scale_high for found in fits)
-    bias = sum(found.bias_low <= 57.0 <= found.bias_high for found in fits)
-    assert abs(scale - 380) <= 13
-    assert abs(bias - 380) <= 13
-    # The floor is the median of the nonlinearity of a linear gyro.
-    above = sum(found.nonlinearity_ppm > found.floor_ppm for found in fits)
-    assert 0.3 * 400 < above < 0.65 * 400
+def test_the_line_through_a_bent_gyro_is_the_least_squares_line():
+    transfer = bent(120, 300)
+    (found,) = fit(turn(LOOP, np.random.default_rng(0), 1, transfer))
+    right = truth(LOOP, transfer)
+    assert found.scale == pytest.approx(right["scale"], rel=1e-9)
+    assert found.bias == pytest.approx(right["bias"], rel=1e-6)
+    assert found.nonlinearity_ppm == pytest.approx(right["nonlinearity_full_scale"], rel=1e-3)
 
 
 def test_floor_of_the_reference_test():
     # METRICS: N = 6.17 deg/√h and 20 s a point give a floor of about 150-200 ppm of 300 deg/s.
-    error = 6.17 / 60 / math.sqrt(20) / 0.0149
-    (found,) = fit_scale_factor(RATES, means(np.random.default_rng(3)), np.full((RATES.size, 1), error), [GYRO])
-    assert 150 < found.floor_ppm < 200
+    means = turn(ONCE, np.random.default_rng(3), 30, white=6.17 / 60 / math.sqrt(20))
+    assert 150 < np.median([found.floor_ppm for found in fit(means)]) < 200
 
 
-def test_nonlinearity_and_residuals():
-    bent = (57.0 + RATES / 0.0149 + 1e-6 * RATES**3)[:, None]
-    (found,) = fit_scale_factor(RATES, bent, np.full_like(bent, 0.01), [GYRO])
-    assert found.nonlinearity_ppm == pytest.approx(1e6 * np.abs(found.residual).max() / 300)
-    assert found.nonlinearity_ppm > 50 * found.floor_ppm
-    np.testing.assert_allclose(found.residual, (bent[:, 0] - found.bias) * found.scale - RATES, atol=1e-9)
+def test_the_floor_is_what_half_of_linear_gyros_show():
+    fits = fit(turn(LOOP, np.random.default_rng(4), 60, white=WHITE))
+    above = np.mean([found.nonlinearity_ppm > found.floor_ppm for found in fits])
+    assert 0.25 < above < 0.75  # 0.5 ± 4 standard errors of 60 tests
+
+
+def test_residuals():
+    (found,) = fit(turn(LOOP, np.random.default_rng(5), 1, white=WHITE))
+    np.testing.assert_allclose(found.residual, (found.mean_count - found.bias) * found.scale - found.rate, atol=1e-9)
+    np.testing.assert_allclose(found.standard_error, WHITE, rtol=1e-3)
+    assert found.direction.tolist()[:3] == [0, 1, 1]
 
 
 def test_a_gyro_mounted_upside_down():
-    gyro = GyroNominal("g2", 0.0153, 0.0, -1, 300.0)
-    found = fit(means(np.random.default_rng(4), sign=-1), gyro)
-    assert found.scale == pytest.approx(0.0149, rel=1e-3)
-    assert found.scale_low < 0.0149 < found.scale_high
+    means = turn(ONCE, np.random.default_rng(4), 1, white=WHITE, sign=-1)
+    (found,) = fit_scale_factor(means, [gyro(sign=-1)])
+    assert found.scale == pytest.approx(SCALE, rel=1e-3)
+    assert found.scale_low < SCALE < found.scale_high
     assert np.abs(found.residual).max() < 0.2
 
 
 def test_a_gyro_against_its_sign_is_named():
+    means = turn(ONCE, np.random.default_rng(5), 1, white=WHITE, sign=-1)
     with pytest.raises(DataError, match="'g1' turns against the table") as error:
-        fit(means(np.random.default_rng(5), sign=-1), where="calibration")
+        fit(means, where="calibration")
     assert "sign to -1" in str(error.value)
     assert str(error.value).startswith("calibration:")
 
 
 def test_stuck_and_clipped_gyros_keep_nominal_values():
-    mean = np.full((RATES.size, 1), 12.0)
-    stuck = fit(mean)
-    assert (stuck.source, stuck.scale) == ("nominal", GYRO.scale)
+    means = exact()
+    (stuck,) = fit(replace(means, mean=np.full_like(means.mean, 12.0)))
+    assert (stuck.source, stuck.scale, stuck.figures) == ("nominal", gyro().scale, {})
     assert "does not answer" in stuck.note
-    clipped = np.full((RATES.size, 1), np.nan)
-    assert "clipped" in fit(clipped).note
+    (clipped,) = fit(replace(means, mean=np.full_like(means.mean, np.nan)))
+    assert "clipped" in clipped.note
+
+
+def test_a_clipped_plateau_is_left_out():
+    means = exact()
+    means.mean[np.abs(ONCE) == 300] = np.nan
+    (found,) = fit(means)
+    assert found.scale == pytest.approx(SCALE)
+    assert found.rate.max() == 275
+    assert len(found.rate) == len(found.temperature) == len(found.direction) == len(ONCE) - 2
 
 
 def test_earth_rate():
     # At 30° the vertical axis feels half of the Earth rate: it must not end up in the bias.
-    sensed = RATES + 0.5 * EARTH_RATE_DEG_H / 3600
-    mean = (57.0 + sensed / 0.0149)[:, None]
-    assert fit(mean, latitude_deg=30.0).bias == pytest.approx(57.0, abs=1e-6)
-    assert fit(mean).bias == pytest.approx(57.0 + 0.5 * EARTH_RATE_DEG_H / 3600 / 0.0149, abs=1e-6)
+    felt = 0.5 * EARTH_RATE_DEG_H / 3600
+    means = turn(ONCE, np.random.default_rng(0), 1, lambda rate: rate + felt)
+    (with_latitude,), (without,) = fit(means, latitude_deg=30.0), fit(means)
+    assert with_latitude.bias == pytest.approx(BIAS, abs=1e-6)
+    assert without.bias == pytest.approx(BIAS + felt / SCALE, abs=1e-6)
+    np.testing.assert_allclose(with_latitude.residual, 0, atol=1e-9)
 
 
 def test_too_few_rates():
     with pytest.raises(TooShort, match="2 different rates"):
-        fit_scale_factor(np.array([0.0, 10.0, 0.0]), np.zeros((3, 1)), np.zeros((3, 1)), [GYRO])
+        fit(exact(np.array([0.0, 10.0, 0.0])))
 
 
-def test_plateau_means_and_their_standard_error():
-    # White noise of 10 counts, 8 s at 200 Hz: standard error 10/√1600 = 0.25.
-    rng = np.random.default_rng(6)
-    time = np.arange(4000) / 200.0
-    counts = np.where(time < 10, 100.0, 500.0)[:, None] + 10 * rng.standard_normal((4000, 40))
-    found = average_plateaus(counts, time, [(1.0, 9.0, 0.0), (11.0, 19.0, 50.0), (30.0, 40.0, 0.0)])
-    assert found.samples.tolist() == [1601, 1601, 0]
-    np.testing.assert_allclose(found.mean[:2].mean(axis=1), [100, 500], atol=0.2)
-    assert np.median(found.standard_error[:2]) == pytest.approx(0.25, rel=0.1)
-    assert np.isnan(found.mean[2]).all()
+def test_rates_of_a_log_scatter():
+    # A logged table holds 25 deg/s as 25.004 and 24.997: one rate, visited twice.
+    wobble = 0.004 * np.random.default_rng(7).standard_normal(LOOP.size)
+    means = turn(LOOP, np.random.default_rng(8), 1, white=WHITE)
+    (found,) = fit(replace(means, rate=LOOP + wobble, mean=means.mean + wobble[:, None] / SCALE))
+    assert found.figures["hysteresis"].state == "below the floor"
+    assert found.scale_low < SCALE < found.scale_high
 
 
-def test_a_clipped_plateau_is_left_out_for_that_gyro():
-    time = np.arange(1000) / 100.0
-    counts = np.tile([[5.0, 5.0]], (1000, 1)) + np.random.default_rng(7).standard_normal((1000, 2))
-    counts[500, 1] = 32767
-    found = average_plateaus(counts, time, [(0.0, 9.0, 0.0)], (-32768, 32767))
-    assert np.isfinite(found.mean[0, 0])
-    assert np.isnan(found.mean[0, 1])
+def test_rates_in_order_leave_no_drift():
+    # From -300 to 300 in one go: a drift in time is a change of scale factor.
+    rates = np.arange(-300.0, 301.0, 25.0)
+    (found,) = fit(turn(rates, np.random.default_rng(9), 1, white=WHITE))
+    assert "no drift" in found.note
+
+
+def test_cross_axis():
+    # A gyro tilted by 0.5° sees sin(0.5°) = 0.87 % of the table's rate; another stands upright.
+    means = turn(LOOP, np.random.default_rng(10), 2, lambda rate: rate * math.sin(math.radians(0.5)), white=1e-3)
+    upright = turn(LOOP, np.random.default_rng(11), 1, np.zeros_like, white=1e-3)
+    means = replace(means, mean=np.column_stack([means.mean[:, 0], upright.mean]))
+    tilted, none = cross_axis(means, [GyroNominal("x", SCALE, 0.0, 1), GyroNominal("y", SCALE, 0.0, -1)])
+    assert tilted.state == "value"
+    assert tilted.low < 100 * math.sin(math.radians(0.5)) < tilted.high
+    assert none.state == "below the floor"
+    assert none.low < 0 < none.high

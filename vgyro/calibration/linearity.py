@@ -88,6 +88,6 @@ def _size(
     """A figure that is the size of combinations [J, p]; `seen` [J, P] gives the floor."""
     fit = response.fit
     limits = size_and_limits(combination @ fit.estimate, fit.draws(combination, DRAWS), size, confidence)
-    by_noise = size(noise_draws(seen @ fit.noise @ seen.T))
+    by_noise = size(noise_draws(seen, fit.noise))
     stands_out = float(size(seen @ response.model.visits.count)) > float(np.quantile(by_noise, confidence))
     return unsigned(*limits, float(np.median(by_noise)), stands_out, note)

@@ -161,10 +161,13 @@ def _response(model: Model, fit: LinearFit, smooth: bool) -> Response:
     loop[:, before : before + loops] = _loop_shape(rates[pairs] / visits.largest, loops)[: len(loop)]
     at_rate = np.equal.outer(np.arange(len(rates)), group)
     up, down = (_averaging(at_rate[pairs] & (visits.direction == side)) for side in (1, -1))
-    others = np.hstack([straight(visits.rate), model.loop, model.drift])
-    seen_bend = _averaging(at_rate) @ _left_by(others)
-    others = np.hstack([straight(visits.rate), model.bend[group], model.drift])
-    seen_loop = (up - down) @ _left_by(others)
+    # As seen: what least squares finds for the other columns is taken off the counts.
+    design, found = model.design, np.linalg.pinv(model.design)
+    is_loop = np.arange(design.shape[1]) >= before
+    is_loop[before + loops :] = False
+    is_other = np.arange(design.shape[1]) >= before
+    seen_bend = _averaging(at_rate) @ _left_by(straight(visits.rate)) @ _taken_off(design, found, is_other)
+    seen_loop = (up - down) @ _taken_off(design, found, ~is_loop)
     return Response(
         model, fit, line[0], line[1], transfer, transfer - straight(rates) @ line, loop, seen_bend, seen_loop, smooth
     )
@@ -218,6 +221,11 @@ def _loop_shape(size: np.ndarray, terms: int) -> np.ndarray:
 def _left_by(design: np.ndarray) -> np.ndarray:
     """What least squares on the design [P, p] leaves: [P, P]."""
     return np.eye(len(design)) - design @ np.linalg.pinv(design)
+
+
+def _taken_off(design: np.ndarray, found: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """The values less some columns [p] bool of the design [P, p] times what `found` [p, P] gives for them: [P, P]."""
+    return np.eye(len(design)) - design[:, columns] @ found[columns]
 
 
 def _averaging(chosen: np.ndarray) -> np.ndarray:

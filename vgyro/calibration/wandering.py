@@ -9,6 +9,7 @@ import numpy as np
 SHARES = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # flicker, and random walk, over the white variance of one value
 SEED = 1431
 BISECTIONS = 50
+ROUNDING = 1e-12  # of the largest value: no scatter is smaller
 FEWEST_FREE = 6  # degrees of freedom that can tell slow noise from white
 
 
@@ -51,13 +52,13 @@ class LinearFit:
         return float(np.sqrt(max(combination @ self.covariance @ combination, 0.0)))
 
     def draws(self, combinations: np.ndarray, number: int) -> np.ndarray:
-        """Errors of combinations [J, p] · coefficients: [number, J], the same for the same fit."""
+        """Errors of combinations [J, p] · coefficients: [J, number], the same for the same fit."""
         generator = np.random.default_rng(SEED)
         shape = generator.choice(len(self.share), size=number, p=self.share)
         unit = generator.standard_normal((number, len(self.estimate)))
         unit *= np.sqrt(self.freedom / generator.chisquare(self.freedom, number))[:, None]
         moved = self.centre[shape] - self.estimate + np.einsum("nqr,nr->nq", self.root[shape], unit)
-        return moved @ combinations.T
+        return combinations @ moved.T
 
     def _parts(self, combination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Middle, from the estimate, and spread of each part of the mixture for a combination: [G], [G]."""
@@ -115,7 +116,7 @@ def fit_linear(
     projected = np.einsum("gpq,gp->gq", basis, data)
     estimates = np.einsum("gqr,gr->gq", inverse, projected)
     squares = np.sum((data - np.einsum("gpq,gq->gp", basis, projected)) ** 2, axis=1)
-    squares = np.maximum(squares, np.finfo(float).tiny)
+    squares = np.maximum(squares, freedom * (ROUNDING * np.abs(values).max()) ** 2 + np.finfo(float).tiny)
     likelihood = belief - 0.5 * freedom * np.log(squares)
     for factor in (lower, triangle):
         likelihood -= np.log(np.abs(np.diagonal(factor, axis1=1, axis2=2))).sum(axis=1)
