@@ -17,7 +17,7 @@ WEIGHTS = {"average": np.full(GYROS, 1 / GYROS), "unequal": np.array([0.35, 0.25
 LOW_PASS = LowPass(BANDWIDTH_HZ)
 FACTORS = ("if_mean", "if_sigma", "if_sigma_equal", "if_arw", "if_arw_1s", "if_bias_drift")
 BAND = 0.90, 0.98  # of 200 runs, in which the interval shall hold the true factor
-RUNS, TRUTH_RUNS = 200, 300
+RUNS = 200
 FLICKER = 2 * math.log(2) / math.pi
 
 
@@ -57,11 +57,11 @@ class Array:
         )
         return np.sqrt(white / tau[:, None] + FLICKER * flicker + walk * tau[:, None] / 3)
 
-    def truth(self, tau: np.ndarray) -> list[dict[str, float]]:
+    def truth(self, tau: np.ndarray, runs: int) -> list[dict[str, float]]:
         """The true factors of the three virtual gyros; of 1σ and σ(1 s) from the mean squares of many other runs."""
         squares = np.zeros((3, GYROS + 3))
         settled = math.ceil(8 * RATE_HZ / (2 * math.pi * BANDWIDTH_HZ))
-        for seed in range(TRUTH_RUNS):
+        for seed in range(runs):
             series = self.series(100_000 + seed)
             equal = np.column_stack([*(low_passed(column) for column in series.T[:-1]), series[:, -1]])
             steps = np.diff(series.reshape(SECONDS, -1, GYROS + 3).mean(axis=1), axis=0)
@@ -96,7 +96,7 @@ def coverage(drifts: bool, runs: int, bootstrap: int) -> dict[tuple[int, str], f
     array = Array(drifts)
     sampling = Sampling.of(RATE_HZ, np.zeros(int(SECONDS * RATE_HZ), int))
     tau = allan_deviation(array.series(0)[:, 0], RATE_HZ).tau
-    truth = array.truth(tau)
+    truth = array.truth(tau, 3 * runs // 2)
     inside = {(fused, name): 0 for fused in range(3) for name in FACTORS}
     filters = [LowPass()] * (GYROS + 2) + [LOW_PASS]
     for seed in range(runs):
@@ -110,9 +110,9 @@ def coverage(drifts: bool, runs: int, bootstrap: int) -> dict[tuple[int, str], f
 
 
 def test_intervals_hold_the_true_factors_in_most_of_a_few_runs():
-    # 12 runs of 18 factors: at a coverage of 95 % the mean of all is above 85 % all but always.
-    found = coverage(True, 12, 100)
-    assert np.mean(list(found.values())) >= 0.85
+    # 8 runs of 18 factors: at a coverage of 95 % the mean of all is above 80 % all but always.
+    found = coverage(True, 8, 100)
+    assert np.mean(list(found.values())) >= 0.80
 
 
 @pytest.mark.full

@@ -16,7 +16,11 @@ from vgyro.metrics.improvement import improvement_by_draws, improvement_factor
 
 @dataclass(frozen=True)
 class ArrayMoments:
-    """mean, sigma [S], deg/s; mean_drawn, sigma_drawn [R, S] replicates; sigma_expected [S] : their centre; note"""
+    """Moments of S series, deg/s, and R replicates.
+
+    mean, sigma [S];  mean_drawn, sigma_drawn [R, S]
+    sigma_expected : what the replicates of 1σ scatter about, [S], or [R, S] where each has its own
+    """
 
     mean: np.ndarray
     sigma: np.ndarray
@@ -50,7 +54,8 @@ class ArrayMoments:
     def sigma_factor(self, singles: int, column: int, confidence: float) -> Reading:
         """Improvement factor of 1σ."""
         drawn, expected = self.sigma_drawn, self.sigma_expected
-        centre = float(np.mean(expected[:singles]) / expected[column]) if expected[column] > 0 else 0.0
+        with np.errstate(invalid="ignore", divide="ignore"):
+            centre = np.mean(expected[..., :singles], axis=-1) / expected[..., column]
         return improvement_by_draws(
             self.sigma[:singles], float(self.sigma[column]), drawn[:, :singles], drawn[:, column], centre, confidence
         )
@@ -86,7 +91,7 @@ def array_moments(
         wider = np.fmax(np.std(resampled.mean, axis=0) / np.std(drawn.mean, axis=0), 1.0)
     note = f"bootstrap of blocks of {block * unit_s:g} s, the fitted drift drawn again"
     return ArrayMoments(
-        mean, sigma, mean + drawn.mean * wider, sigma_drawn, np.sqrt(within + drawn.expected), note
+        mean, sigma, mean + drawn.mean * wider, sigma_drawn, np.sqrt(within + drawn.variance_expected), note
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from vgyro.metrics.cross_allan import CrossAllan
 MOST_BLOCKS = 1024
 FEWEST_TAUS = 4
 EVIDENCE = 0.05
+KNOWN_AT, FEWEST_FREEDOM = 0.6, 3.0  # of the longest τ, which is a third of the recording
 FLICKER = 2 * math.log(2) / math.pi
 PASSES, SWEEPS = 3, 60
 BATCH = 1 << 19  # numbers that are drawn together
@@ -22,16 +23,26 @@ PER_OCTAVE = 3
 
 @dataclass(frozen=True)
 class DriftModel:
-    """Covariances [S, S] of white noise (deg/s)²/Hz, flicker (deg/s)² and random walk (deg/s)²/s of S series."""
+    """Covariances [S, S] of white noise (deg/s)²/Hz, flicker (deg/s)² and random walk (deg/s)²/s of S series.
+
+    freedom : degrees of freedom that the size of flicker and walk is known with
+    """
 
     white: np.ndarray
     flicker: np.ndarray
     walk: np.ndarray
+    freedom: float
 
-    def deviation(self, tau: np.ndarray) -> np.ndarray:
-        """Allan deviations [M, S] at tau [M], deg/s."""
-        terms = np.stack([np.diag(matrix) for matrix in (self.white, self.flicker, self.walk)])
-        return np.sqrt(_basis(tau) @ terms)
+    @property
+    def drifts(self) -> bool:
+        """Is there flicker or a random walk?"""
+        return bool(self.flicker.any() or self.walk.any())
+
+    def variances(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Allan variances at tau [M] of the white noise, and of flicker and walk, each [M, S]."""
+        white, flicker, walk = (np.diag(matrix) for matrix in (self.white, self.flicker, self.walk))
+        basis = _basis(tau)
+        return np.outer(basis[:, 0], white), np.outer(basis[:, 1], flicker) + np.outer(basis[:, 2], walk)
 
     def correlation(self, tau: float) -> np.ndarray:
         """Correlation [S, S] of the Allan variations at tau, s; 0: of the white noise."""
@@ -45,29 +56,25 @@ class DriftModel:
 
 @dataclass(frozen=True)
 class Drawn:
-    """R replicates of S series over the whole recording, in deg/s; the models' own figures beside them.
+    """R replicates of S series over the whole recording, in deg/s; beside each what the model that it is of expects.
 
     mean     [R, S] : mean about the bias that the series began with
-    variance [R, S] : of the means of blocks of block_s about their mean;  expected [S] : its mean over the replicates
-    lowest   [R, S] : minimum of the Allan deviation from τ = block_s on;  lowest_expected [S] : that of the model
+    variance [R, S] : of the means of blocks of block_s about their mean;  variance_expected [R, S]
+    lowest   [R, S] : minimum of the Allan deviation from τ = block_s on;  lowest_expected [R, S]
     """
 
     mean: np.ndarray
     variance: np.ndarray
+    variance_expected: np.ndarray
     lowest: np.ndarray
     lowest_expected: np.ndarray
     block_s: float
 
-    @property
-    def expected(self) -> np.ndarray:
-        """Mean [S] of the variances."""
-        return self.variance.mean(axis=0)
-
     def scaled(self, factor: np.ndarray) -> Drawn:
         """The draws of series that are so many times as large [S]."""
         return Drawn(
-            self.mean * factor, self.variance * factor**2, self.lowest * factor, self.lowest_expected * factor,
-            self.block_s,
+            self.mean * factor, self.variance * factor**2, self.variance_expected * factor**2, self.lowest * factor,
+            self.lowest_expected * factor, self.block_s,
         )  # fmt: skip
 
 
@@ -79,7 +86,9 @@ def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftMo
     returns  : None where there are too few τ; without flicker and walk where the gyros do not show a drift: a term that
                may not be negative would be found in white noise, too
     Least squares of C(τ) = W/τ + (2 ln2/π)F + Kτ/3 with weights edf/σ⁴, each matrix positive semidefinite: one is
-    fitted at a time and cut at zero, until it settles.
+    fitted at a time and cut at zero, until it settles. What such a fit says of the variance of the mean of the whole
+    recording scatters as chi² with the degrees of freedom that σ² has at a fifth of the recording (by simulation 3.2;
+    the edf of a random walk there is 3.1).
     """
     freedom = np.diagonal(found.edf, axis1=1, axis2=2)[:, :singles].mean(axis=1)
     used = (found.tau >= shortest * (1 - SMALL)) & (freedom >= 1)
@@ -87,7 +96,8 @@ def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftMo
     if len(tau) < FEWEST_TAUS or not np.all(np.diagonal(covariance[0]) > 0):
         return None
     terms = 3 if _drifts(tau, covariance[:, :singles, :singles], edf) else 1
-    return _fit(tau, covariance, edf, terms)
+    known = edf[max(int(np.searchsorted(tau, KNOWN_AT * tau[-1], side="right")) - 1, 0)]
+    return _fit(tau, covariance, edf, terms, max(float(known), FEWEST_FREEDOM))
 
 
 def _drifts(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray) -> bool:
@@ -117,21 +127,37 @@ def draw(
     last = min(blocks // 3, int(longest_tau / block_s + SMALL))
     octaves = np.arange(0, PER_OCTAVE * math.log2(max(last, 1)) + SMALL)
     factors = np.unique(np.round(2.0 ** (octaves / PER_OCTAVE)).astype(int))
-    mean, variance, lowest = [], [], []
-    for series in _series(model, stretches, blocks, block_s, replicates, seed):
-        each = series.mean(axis=-1, keepdims=True)
-        mean.append(each[..., 0].mean(axis=-1))
-        variance.append(np.var(series, axis=-1).mean(axis=-1) if stretches > 1 else np.var(series[:, :, 0], axis=-1))
-        lowest.append(_lowest(series, factors) if last >= 1 else np.full(each.shape[:2], math.nan))
-    expected = model.deviation(factors * block_s).min(axis=0)
-    return Drawn(np.concatenate(mean), np.concatenate(variance), np.concatenate(lowest), expected, block_s)
+    found: list[tuple[np.ndarray, ...]] = []
+    sizes: list[np.ndarray] = []
+    generator = np.random.default_rng(seed)
+    for white, drift in _series(model, stretches, blocks, block_s, replicates, generator):
+        # How large the drift is, is not known: its variance is freedom/χ² times the one found.
+        size = np.full(len(white), 1.0)
+        if drift is not None:
+            size = model.freedom / generator.chisquare(model.freedom, len(white))
+        series = white if drift is None else white + drift * np.sqrt(size)[:, None, None, None]
+        apart = [_variance(white), np.zeros(white.shape[:2]) if drift is None else _variance(drift)]
+        lowest = _lowest(series, factors) if last >= 1 else np.full(white.shape[:2], math.nan)
+        found.append((series.mean(axis=(-2, -1)), _variance(series), lowest, *apart))
+        sizes.append(size)
+    mean, variance, lowest, of_white, of_drift = (np.concatenate(part) for part in zip(*found, strict=True))
+    share = np.concatenate(sizes)[:, None]
+    expected = of_white.mean(axis=0) + share * of_drift.mean(axis=0)
+    curve, rise = model.variances(factors * block_s)
+    minimum = np.sqrt(np.min(curve[:, None] + share * rise[:, None], axis=0))
+    return Drawn(mean, variance, expected, lowest, minimum, block_s)
+
+
+def _variance(series: np.ndarray) -> np.ndarray:
+    """Variance [r, S] of block means [r, S, stretches, blocks] about the mean of their stretch."""
+    return np.var(series, axis=-1).mean(axis=-1)
 
 
 def _basis(tau: np.ndarray) -> np.ndarray:
     return np.column_stack([1 / tau, np.full(len(tau), FLICKER), tau / 3])
 
 
-def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int) -> DriftModel:
+def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int, freedom: float) -> DriftModel:
     """number : of the terms that are fitted, in the order white, flicker, walk"""
     scale = np.sqrt(np.diagonal(covariance[0]) * tau[0])
     scale = np.where(scale > 0, scale, 1.0)
@@ -149,7 +175,8 @@ def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int) 
                 others = left[term] - sum(gram[term, other] * terms[other] for other in range(number) if other != term)
                 terms[term] = _positive(others / gram[term, term])
         level = basis @ np.trace(terms, axis1=1, axis2=2)
-    return DriftModel(*(terms * size))
+    white, flicker, walk = terms * size
+    return DriftModel(white, flicker, walk, freedom)
 
 
 def _positive(matrix: np.ndarray) -> np.ndarray:
@@ -165,27 +192,27 @@ def _root(matrix: np.ndarray) -> np.ndarray:
 
 
 def _series(
-    model: DriftModel, stretches: int, blocks: int, block_s: float, replicates: int, seed: int
-) -> Iterator[np.ndarray]:
-    """Block means [r, S, stretches, blocks] of replicates, some at a time."""
-    generator = np.random.default_rng(seed)
+    model: DriftModel, stretches: int, blocks: int, block_s: float, replicates: int, generator: np.random.Generator
+) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+    """Block means [r, S, stretches, blocks] of some replicates at a time: of white noise, and of drift (None: none)."""
     white, flicker, walk = (_root(matrix) for matrix in (model.white, model.flicker, model.walk))
-    number = len(model.white)
-    some = max(BATCH // (number * stretches * blocks), 1)
+    shape = len(model.white), stretches, blocks
+    some = max(BATCH // math.prod(shape), 1)
     for first in range(0, replicates, some):
         count = min(some, replicates - first)
+        noise = _mixed(white, generator.standard_normal((count, white.shape[1], *shape[1:]))) / math.sqrt(block_s)
+        drift = None
+        if model.drifts:
+            steps = generator.standard_normal((count, walk.shape[1], *shape[1:]))
+            drift = _mixed(walk, np.cumsum(steps, axis=-1)) * math.sqrt(block_s)
+            drift += _mixed(flicker, _unit_flicker(generator, (count, flicker.shape[1], stretches), blocks))
+        yield noise, drift
 
-        def normal(rank: int, count: int = count) -> np.ndarray:
-            return generator.standard_normal((count, rank, stretches * blocks))
 
-        series = white @ normal(white.shape[1]) / math.sqrt(block_s)
-        if walk.size:
-            steps = normal(walk.shape[1]).reshape(count, -1, stretches, blocks)
-            series += walk @ np.cumsum(steps, axis=-1).reshape(count, -1, stretches * blocks) * math.sqrt(block_s)
-        if flicker.size:
-            drawn = _unit_flicker(generator, (count, flicker.shape[1], stretches), blocks)
-            series += flicker @ drawn.reshape(count, -1, stretches * blocks)
-        yield series.reshape(count, number, stretches, blocks)
+def _mixed(root: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """root [S, r] · unit [n, r, stretches, blocks] → [n, S, stretches, blocks]."""
+    count, rank, *rest = unit.shape
+    return (root @ unit.reshape(count, rank, -1)).reshape(count, len(root), *rest)
 
 
 def _unit_flicker(generator: np.random.Generator, shape: tuple[int, ...], blocks: int) -> np.ndarray:

@@ -33,7 +33,9 @@ def improvement_factor(
     if virtual == 0 or not math.isfinite(virtual):
         return Reading(math.nan, math.nan, math.nan, NOT_KNOWN)
     value = _ratio(singles, virtual)
-    ratios = _ratios(singles_replicates, virtual_replicates)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.mean(np.abs(singles_replicates), axis=1) / np.abs(virtual_replicates)
+    ratios = ratios[np.isfinite(ratios)]
     if ratios.size == 0:
         return Reading(value, math.nan, math.nan, "no interval: the resampled figure is zero")
     if of_size:
@@ -48,22 +50,25 @@ def improvement_by_draws(
     virtual: float,
     singles_drawn: np.ndarray,
     virtual_drawn: np.ndarray,
-    expected: float,
+    expected: np.ndarray,
     confidence: float = 0.95,
 ) -> Reading:
-    """IF with limits from series drawn by a model in which the factor is `expected`.
+    """IF with limits from series drawn by a model.
 
     singles [N], virtual : the figure;  singles_drawn [R, N], virtual_drawn [R] : of the same draws
+    expected : true factor of the model, or [R] of the model of each draw
     The share of the true factor that the draws find is taken to be that which the recording has found.
     """
     if virtual == 0 or not math.isfinite(virtual):
         return Reading(math.nan, math.nan, math.nan, NOT_KNOWN)
     value = _ratio(singles, virtual)
-    ratios = _ratios(singles_drawn, virtual_drawn)
-    if ratios.size == 0 or not expected > 0:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.mean(np.abs(singles_drawn), axis=1) / np.abs(virtual_drawn) / expected
+    shares = shares[np.isfinite(shares) & (shares > 0)]
+    if shares.size == 0:
         return Reading(value, math.nan, math.nan, "no interval: the drawn figure is zero")
     tail = (1 - confidence) / 2
-    above, below = np.quantile(ratios / expected, [1 - tail, tail])
+    above, below = np.quantile(shares, [1 - tail, tail])
     low, high = value / float(above), value / float(below)
     return Reading(value, low, high, significance(low, high))
 
@@ -106,12 +111,6 @@ def log_variance(reading: Reading, confidence: float = 0.95) -> float:
 
 def _ratio(singles: np.ndarray, virtual: float) -> float:
     return float(np.mean(np.abs(singles)) / abs(virtual))
-
-
-def _ratios(singles: np.ndarray, virtual: np.ndarray) -> np.ndarray:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.mean(np.abs(singles), axis=1) / np.abs(virtual)
-    return ratios[np.isfinite(ratios)]
 
 
 def normal_quantile(confidence: float) -> float:

@@ -172,7 +172,7 @@ class _Array:
         lowest = np.array([readings[one]["bias_drift"].value for one in chosen])
         if drawn is not None and tau.min() >= RESOLVED * drawn.block_s:
             expected = drawn.lowest_expected
-            centre = float(np.mean(expected[:number]) / expected[column])
+            centre = np.mean(expected[:, :number], axis=1) / expected[:, column]
             draws = drawn.lowest
             return improvement_by_draws(
                 lowest[:-1], float(lowest[-1]), draws[:, :number], draws[:, column], centre, confidence
