@@ -142,8 +142,8 @@ def test_no_long_loss_is_bridged():
 
 @pytest.mark.parametrize("kind", ["overlapping", "modified", "hadamard", "robust"])
 def test_engines_agree_over_losses(kind: str):
-    there = single_losses(0.02) & bursts(0.1, 1, 300)
-    rate = noise(9)[there]
+    there = (single_losses(0.02) & bursts(0.1, 1, 300))[:20_000]
+    rate = noise(9)[:20_000][there]
     native, reference = (
         allan_deviation(rate, RATE_HZ, sampling=sampled(there), engine=name, kind=kind) for name in ENGINES
     )

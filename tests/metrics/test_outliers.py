@@ -1,5 +1,7 @@
 """Outliers: what is one, and what is not. Simulated, so that every outlier is known."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -37,6 +39,7 @@ def with_spikes(
     return found, at
 
 
+@cache
 def backgrounds() -> dict[str, np.ndarray]:
     """Noise of 400 000 samples without any outlier."""
     noise, time = white(1), np.arange(400_000) / RATE_HZ
