@@ -6,7 +6,7 @@ import numpy as np
 
 from vgyro import units
 from vgyro.calibration.figures import Finding, not_measured, unsigned
-from vgyro.calibration.wandering import fit_linear
+from vgyro.calibration.wandering import Errors
 
 FEWEST_FOR_TEMPERATURE = 4
 FEWEST_KELVIN = 1.0
@@ -50,7 +50,7 @@ def _repeatability(values: np.ndarray, error: np.ndarray, temperature: np.ndarra
     left, freedom, note = values - values.mean(), cycles - 1, f"{cycles} power cycles"
     if temperature is not None and cycles >= FEWEST_FOR_TEMPERATURE and np.ptp(temperature) >= FEWEST_KELVIN:
         design = np.column_stack([np.ones(cycles), temperature])
-        left = values - design @ fit_linear(design, values).estimate
+        left = values - design @ Errors(cycles).fit(design, values).estimate
         freedom, note = cycles - 2, f"{note}, straight line in temperature taken off"
     squares, noise = float(left @ left), float(np.mean(error**2))
     tail = (1 - confidence) / 2

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.calibration.wandering import LinearFit, fit_linear
+from vgyro.calibration.wandering import Errors, LinearFit
 
 SAME_RATE = 1e-4  # of the largest rate
 RATES_PER_BEND = 3
@@ -66,10 +66,9 @@ class Model:
         """[P, p]"""
         return np.hstack([straight(self.visits.rate), self.bend[self.group], self.loop, self.drift])
 
-    def fit(self) -> LinearFit:
-        """The white variance of a plateau goes with 1 / seconds; slow noise: see `fit_linear`."""
-        visits = self.visits
-        return fit_linear(self.design, visits.count, 1 / visits.seconds, visits.time, visits.seconds)
+    def fit(self, errors: Errors) -> LinearFit:
+        """Of the counts."""
+        return errors.fit(self.design, self.visits.count)
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,8 @@ def same_rates(rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def fit_response(visits: Visits) -> Response:
     """Fit the model to the plateaus of one gyro at 3 different rates or more.
 
-    A drift is fitted where there are 8 plateaus and the order of the rates allows to tell it from the rest; a loop,
+    The white variance of a plateau goes with 1 / seconds; its slow noise is allowed for by `Errors`. A drift is fitted
+    where there are 8 plateaus and the order of the rates allows to tell it from the rest; a loop,
     where 3 rates were reached from both sides.
     """
     rates, group = same_rates(visits.rate)
@@ -139,10 +139,11 @@ def fit_response(visits: Visits) -> Response:
     bend = _smooth_bend(rates)
     drift = _drift(visits, np.hstack([straight(visits.rate), bend[group], loop]))
     smooth = Model(visits, rates, group, pairs, bend, loop, drift)
-    fit = smooth.fit()
+    errors = Errors(len(visits.rate), 1 / visits.seconds, visits.time, visits.seconds)
+    fit = smooth.fit(errors)
     free = Model(visits, rates, group, pairs, _free_bend(rates), loop, drift)
     if _refused(smooth, free, fit):
-        return _response(free, free.fit(), smooth=False)
+        return _response(free, free.fit(errors), smooth=False)
     return _response(smooth, fit, smooth=True)
 
 

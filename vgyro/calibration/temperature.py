@@ -10,7 +10,7 @@ import numpy as np
 from vgyro import units
 from vgyro.calibration.convert import to_rates
 from vgyro.calibration.figures import VALUE, Finding, not_measured, signed
-from vgyro.calibration.wandering import fit_linear
+from vgyro.calibration.wandering import Errors
 
 FEWEST_KELVIN = 1.0
 FEWEST_TEMPERATURES = 3  # for a slope with limits
@@ -115,9 +115,8 @@ def scale_temperature(
         slope = np.polyfit(temperature, sensitivity, 1)[0]
         return Finding(float(slope), math.nan, math.nan, math.nan, VALUE, "two temperatures: no limits")
     weight = error**2 if np.all(error > 0) else np.ones_like(error)
-    fit = fit_linear(
-        np.column_stack([np.ones_like(temperature), temperature - temperature.mean()]), sensitivity, weight
-    )
+    design = np.column_stack([np.ones_like(temperature), temperature - temperature.mean()])
+    fit = Errors(len(design), weight).fit(design, sensitivity)
     slope = np.array([0.0, 1.0])
     floor = MEDIAN_OF_NOISE * fit.standard_error(slope)
     note = f"{temperature.size} recordings from {temperature.min():.1f} to {temperature.max():.1f} °C"

@@ -10,7 +10,7 @@ import numpy as np
 
 from vgyro import units
 from vgyro.calibration.figures import Finding, not_measured, signed
-from vgyro.calibration.wandering import LinearFit, average_fits, fit_linear
+from vgyro.calibration.wandering import Errors, LinearFit, average_fits
 from vgyro.errors import TooShort
 
 BLOCKS = 150
@@ -109,7 +109,7 @@ def fit_bias_temperature(
 ) -> BiasTemperature:
     """Polynomial of up to the third order through the bias, counts [M], at temperatures [M], °C.
 
-    time        : [M], s: the points are block means of one recording, whose errors wander (`fit_linear`)
+    time        : [M], s: the points are block means of one recording, whose errors wander (`Errors`)
                   None: independent tests; the scatter about the curve holds what changes from one switch-on to the next
     error       : [M], counts, standard errors of independent points (None: equal)
     reference_c : the temperature the polynomial is about (None: the mean)
@@ -127,7 +127,8 @@ def fit_bias_temperature(
     when = None if time is None else time[known]
     powers = np.vander((temperature - reference) / span, HIGHEST_ORDER + 1, increasing=True)
     highest = min(HIGHEST_ORDER, temperature.size - 2)
-    fits = [fit_linear(powers[:, : order + 1], bias, weight, when) for order in range(highest + 1)]
+    errors = Errors(len(bias), weight, when)
+    fits = [errors.fit(powers[:, : order + 1], bias) for order in range(highest + 1)]
     evidence = _evidence(fits, powers, bias)
     order = max((step.order for step in evidence if step.p_value < BELIEVED), default=0)
     fit = fits[order]
@@ -167,7 +168,8 @@ def self_heating(
         return not_measured("needs a recording at rest that begins at switch-on")
     constants = np.geomspace(2 * seconds, len(rate) / rate_hz / 2, TIME_CONSTANTS)
     shapes = [np.column_stack([np.ones_like(time), np.exp(-time / constant)]) for constant in constants]
-    fits = [fit_linear(shape, bias, None, time) for shape in shapes]
+    errors = Errors(len(time), None, time)
+    fits = [errors.fit(shape, bias) for shape in shapes]
     # Evidence as if every shape had the same size, so that none is preferred for its unit.
     evidence = np.array([fit.evidence + math.log(shape[:, 1].std()) for fit, shape in zip(fits, shapes, strict=True)])
     fit = average_fits(fits, evidence)

@@ -80,55 +80,67 @@ def student(freedom: int, confidence: float) -> float:
     return float(stdtrit(freedom, 0.5 + confidence / 2))
 
 
-def fit_linear(
-    design: np.ndarray,
-    values: np.ndarray,
-    weight: np.ndarray | None = None,
-    time: np.ndarray | None = None,
-    seconds: np.ndarray | None = None,
-) -> LinearFit:
-    """Generalised least squares with the errors' own correlation found from the residuals.
+class Errors:
+    """What the errors of P values may look like: σ²·(white + a·flicker + b·random walk), a and b on a grid.
 
-    design  : [P, p] of full rank, p < P;  values : [P]
-    weight  : [P], white variance of each value but for a common factor (None: equal)
-    time    : [P], s, middle of what each value is the mean of; None: errors are independent
-    seconds : [P], length of that mean
-    The errors are σ²·(white + a·flicker + b·random walk), a and b on a grid, larger ones a little less
-    likely beforehand (1/√k for the k-th). Each pair gets the weight of its restricted
-    likelihood (Patterson & Thompson 1971; σ² integrated out), and the estimates are averaged over the pairs, the
-    scatter between them counting as error. So slow noise is not mistaken for precision. Flicker and random walk are
-    taken about their mean over the values: a constant in the model is the mean over the test, its wander included.
-    Without `time`, or with fewer than 6 degrees of freedom, it is weighted least squares with σ² from the residuals.
+    Flicker and random walk are taken about their mean over the values: a constant in the model is the mean over the
+    test, its wander included. Slow noise is a little less likely beforehand the larger it is, 1/√k for the k-th of
+    SHARES.
     """
-    white = np.diag(np.ones(len(values)) if weight is None else weight / np.mean(weight))
-    freedom = len(values) - design.shape[1]
-    shapes, belief = white[None], np.zeros(1)
-    if time is not None and freedom >= FEWEST_FREE:
-        length = np.full(len(values), np.median(np.diff(np.sort(time)))) if seconds is None else seconds
-        flicker, walk = (_about_mean(shape) for shape in (flicker_shape(time, length), walk_shape(time)))
-        shapes = np.stack([white + a * flicker + b * walk for a in SHARES for b in SHARES])
-        belief = np.add.outer(*2 * [-0.5 * np.log(np.arange(1, len(SHARES) + 1))]).ravel()
-    lower = np.linalg.cholesky(shapes)
-    whitened = np.linalg.solve(lower, np.column_stack([design, values])[None])
-    model, data = whitened[:, :, :-1], whitened[:, :, -1]
-    basis, triangle = np.linalg.qr(model)
-    inverse = np.linalg.inv(triangle)
-    projected = np.einsum("gpq,gp->gq", basis, data)
-    estimates = np.einsum("gqr,gr->gq", inverse, projected)
-    squares = np.sum((data - np.einsum("gpq,gq->gp", basis, projected)) ** 2, axis=1)
-    squares = np.maximum(squares, freedom * (ROUNDING * np.abs(values).max()) ** 2 + np.finfo(float).tiny)
-    likelihood = belief - 0.5 * freedom * np.log(squares)
-    for factor in (lower, triangle):
-        likelihood -= np.log(np.abs(np.diagonal(factor, axis1=1, axis2=2))).sum(axis=1)
-    share = np.exp(likelihood - likelihood.max())
-    evidence = float(likelihood.max() + np.log(share.sum()))
-    share /= share.sum()
-    estimate = share @ estimates
-    apart = estimates - estimate
-    root = inverse * np.sqrt(squares / freedom)[:, None, None]
-    covariance = np.einsum("g,gqr,gsr->qs", share, root, root) + np.einsum("g,gq,gr->qr", share, apart, apart)
-    noise = np.einsum("g,gpq->pq", share * squares / freedom, shapes)
-    return LinearFit(estimate, covariance, noise, freedom, evidence, share, estimates, root)
+
+    def __init__(
+        self,
+        number: int,
+        weight: np.ndarray | None = None,
+        time: np.ndarray | None = None,
+        seconds: np.ndarray | None = None,
+    ) -> None:
+        """number  : P
+
+        weight  : [P], white variance of each value but for a common factor (None: equal)
+        time    : [P], s, middle of what each value is the mean of; None: errors are independent
+        seconds : [P], length of that mean (None: from one to the next)
+        """
+        white = np.diag(np.ones(number) if weight is None else weight / np.mean(weight))
+        self._shapes, self._belief = white[None], np.zeros(1)
+        if time is not None:
+            length = np.full(number, np.median(np.diff(np.sort(time)))) if seconds is None else seconds
+            flicker, walk = (_about_mean(shape) for shape in (flicker_shape(time, length), walk_shape(time)))
+            self._shapes = np.stack([white + a * flicker + b * walk for a in SHARES for b in SHARES])
+            self._belief = np.add.outer(*2 * [-0.5 * np.log(np.arange(1, len(SHARES) + 1))]).ravel()
+        lower = np.linalg.cholesky(self._shapes)
+        self._whitening = np.linalg.inv(lower)
+        self._size = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+
+    def fit(self, design: np.ndarray, values: np.ndarray) -> LinearFit:
+        """Generalised least squares of values [P] on a design [P, p] of full rank, p < P.
+
+        Each shape of the errors gets the weight of its restricted likelihood (Patterson & Thompson 1971; σ² integrated
+        out), and the estimates are averaged over the shapes, the scatter between them counting as error. So slow noise
+        is not mistaken for precision. With fewer than 6 degrees of freedom the errors are taken as white: weighted
+        least squares, σ² from the residuals.
+        """
+        freedom = len(values) - design.shape[1]
+        kept = slice(None) if freedom >= FEWEST_FREE else slice(1)  # the first shape is white
+        shapes, whitening = self._shapes[kept], self._whitening[kept]
+        model, data = whitening @ design, whitening @ values
+        basis, triangle = np.linalg.qr(model)
+        inverse = np.linalg.inv(triangle)
+        projected = np.einsum("gpq,gp->gq", basis, data)
+        estimates = np.einsum("gqr,gr->gq", inverse, projected)
+        squares = np.sum((data - np.einsum("gpq,gq->gp", basis, projected)) ** 2, axis=1)
+        squares = np.maximum(squares, freedom * (ROUNDING * np.abs(values).max()) ** 2 + np.finfo(float).tiny)
+        determinant = np.log(np.abs(np.diagonal(triangle, axis1=1, axis2=2))).sum(axis=1)
+        likelihood = self._belief[kept] - 0.5 * freedom * np.log(squares) - self._size[kept] - determinant
+        share = np.exp(likelihood - likelihood.max())
+        evidence = float(likelihood.max() + np.log(share.sum()))
+        share /= share.sum()
+        estimate = share @ estimates
+        apart = estimates - estimate
+        root = inverse * np.sqrt(squares / freedom)[:, None, None]
+        covariance = np.einsum("g,gqr,gsr->qs", share, root, root) + np.einsum("g,gq,gr->qr", share, apart, apart)
+        noise = np.einsum("g,gpq->pq", share * squares / freedom, shapes)
+        return LinearFit(estimate, covariance, noise, freedom, evidence, share, estimates, root)
 
 
 def average_fits(fits: list[LinearFit], evidence: np.ndarray) -> LinearFit:
