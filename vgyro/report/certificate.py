@@ -23,6 +23,7 @@ FLOOR_WORDS = (
     "test does not show that the effect exists; given is its upper limit, or for a figure with a sign both limits."
 )
 NOT_GIVEN = "not given"
+SAID_ELSEWHERE = ("full scale", "the nonlinearity is")
 MAIN = (
     ("scale", Figure("Scale factor", "deg/s a count", "slope of the table's rate over the output")),
     (
@@ -127,7 +128,8 @@ def _table(dataset: DatasetPart, gyros: Mapping[str, Record], number: int) -> Ma
 
 def _main_cell(record: Record, key: str, notes: Notes) -> Cell:
     value, low, high = (_number(record.get(name)) for name in (key, f"{key}_low", f"{key}_high"))
-    note = str(record.get("note") or "") if key == MAIN[0][0] else ""
+    clauses = str(record.get("note") or "").split("; ") if key == MAIN[0][0] else []
+    note = "; ".join(clause for clause in clauses if not clause.startswith(SAID_ELSEWHERE))
     return number_cell(value, low, high, notes=notes.number(note))
 
 

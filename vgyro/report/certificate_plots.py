@@ -13,7 +13,7 @@ from vgyro.report.model import Record
 from vgyro.report.plots import Axis, Curve, Marker, curve_plot
 
 NAN = float("nan")
-MOST_SHOWN = 6
+MOST_SHOWN = 2  # six loops over each other show nothing
 TABLE_RATE = Axis("rate of the table, deg/s")
 # direction of the point → words, mark
 DIRECTIONS: dict[str, tuple[str, Marker]] = {
@@ -46,11 +46,15 @@ def _residuals(axis: str, gyros: Mapping[str, Record]) -> Markup:
             curves.append(
                 Curve(
                     f"{name} {direction}", name, rate, residual, residual - error, residual + error, colour=index,
-                    points=True, line=False, marker=marker, group=words, visible=index < MOST_SHOWN,
+                    width=0.7, points=True, line=direction != "none", marker=marker, group=words,
+                    visible=index < MOST_SHOWN,
                 )
             )  # fmt: skip
     curves.sort(key=lambda curve: list(DIRECTIONS).index(curve.name.rsplit(" ", 1)[1]))
-    title, summary = "Residuals of the straight line", "bars: one standard error of the mean at each rate"
+    title, summary = (
+        "Residuals of the straight line",
+        "bars: one standard error of the mean; faded gyros are hidden: click to show them",
+    )
     y = Axis("output − line, deg/s")
     return curve_plot(
         f"scale-residuals-{axis}", title, curves, TABLE_RATE, y, summary=summary, levels=(0.0,), height=300
@@ -96,7 +100,19 @@ def _bias_plot(axis: str, gyros: Mapping[str, Record]) -> Markup:
     if not curves:
         return Markup("")
     title, y = "Zero-rate output against temperature", Axis("less that at the reference, deg/s")
-    return curve_plot(f"bias-temperature-{axis}", title, curves, Axis("temperature, °C"), y, levels=(0.0,), height=260)
+    summary = (
+        "the curve is laid through the line's zero-rate output; points beside it: bend of the line, other power cycles"
+    )
+    return curve_plot(
+        f"bias-temperature-{axis}",
+        title,
+        curves,
+        Axis("temperature, °C"),
+        y,
+        summary=summary,
+        levels=(0.0,),
+        height=260,
+    )
 
 
 def _scale_plot(axis: str, gyros: Mapping[str, Record]) -> Markup:
