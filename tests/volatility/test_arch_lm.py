@@ -68,6 +68,20 @@ def test_too_short(samples, lags):
     arch_lm(np.random.default_rng(0).standard_normal((2 * lags + 2, 1)), lags)
 
 
+def test_samples_that_take_no_part():
+    # By definition: what lies outside the kept stretch changes nothing; one sample out takes its lagged rows with it.
+    rng = np.random.default_rng(8)
+    r = rng.standard_normal((400, 1))
+    keep = np.arange(400) < 250
+    assert arch_lm(r, 2, keep).statistic[0] == pytest.approx(arch_lm(r[:250], 2).statistic[0], rel=1e-9)
+    knocked = r.copy()
+    knocked[300] = 1e3
+    keep = np.arange(400) != 300
+    assert arch_lm(knocked, 2, keep).statistic[0] == pytest.approx(arch_lm(r, 2, keep).statistic[0], rel=1e-6)
+    with pytest.raises(TooShort, match="3 samples are kept with their 2 lags"):
+        arch_lm(r, 2, np.arange(400) < 5)
+
+
 def test_kurtosis():
     # Closed form: two equal values ±1 have kurtosis 1; scipy.stats for the rest.
     from scipy.stats import kurtosis as scipy_kurtosis

@@ -60,8 +60,9 @@ def explain_array(
     returns : one Effect a gyro. The verdict is `nothing`, or any of heteroskedastic, drift, tone at … Hz, disturbance
               at t = … s, joined by +, or correlation; or why there is none: no variance, too short.
 
-    At T = 3600, GARCH(1,1) is missed in about 1 of 10 series at α = 0.02, β = 0.97, and in less than 1 of 100 at
-    α >= 0.05, β >= 0.9; at α = 0.05, β = 0.5 in every second one: the tests have that power, no more.
+    Power, T = 3600 (400 simulated series each): GARCH(1,1) is missed in less than 1 % of series at (α, β) = (.1, .8),
+    (.05, .9), (.2, .75), (.1, .3); in 14 % at (.02, .97), 24 % at (.03, .9), 29 % at (.05, .5). White noise is called
+    anything but `nothing` in 2 to 3 % (T = 120, 360, 3600).
     """
     found = [
         gather_evidence(values[:, column], sampled, span, lags, tones.get(gyro, ()), garch.get(gyro))
