@@ -120,8 +120,8 @@ def test_the_truth_is_within_the_intervals_of_ninety_calibrations_of_a_hundred()
 def below_the_floor(seeds: range, rate_hz: float | None) -> tuple[float, int]:
     """Mean floor of the test, ppm, and in how many seeds 50 ppm (g3) are reported as below it."""
     twin, whole = shipped()
-    # Noise that gives a floor of 77 ppm at 14.4 s a point; that of g3 as shipped gives 12.2 ppm, of white noise alone.
-    noisy = changed(twin, "cycle1", rate_hz, {"all": {"arw_deg_rt_h": 3.25}})
+    # Noise that gives a floor of 77 ppm at 14.4 s a point; that of g3 as shipped gives 12 ppm.
+    noisy = changed(twin, "cycle1", rate_hz, {"all": {"arw_deg_rt_h": 3.12}})
     board = only(whole, "g3")
     findings = [calibrated(noisy, board, "cycle1", seed).figures["nonlinearity_full_scale"] for seed in seeds]
     assert calibration_truth(noisy, board, "cycle1")["g3"]["nonlinearity_full_scale"] == pytest.approx(50, abs=0.1)
@@ -142,9 +142,9 @@ def test_fifty_ppm_under_a_floor_of_77_are_not_claimed_in_ninety_of_100_tests() 
     assert below >= 90
 
 
-def test_fifty_ppm_above_a_floor_of_12_are_found() -> None:
+def test_fifty_ppm_at_twice_the_floor_and_more_are_found() -> None:
     twin, whole = shipped()
     finding = calibrated(twin, only(whole, "g3"), "cycle1", 1).figures["nonlinearity_full_scale"]
-    assert finding.floor == pytest.approx(12, rel=0.25)
+    assert finding.floor < 25  # 12 on average, and it is itself an estimate
     assert finding.state == VALUE
     assert finding.low <= 50 <= finding.high
