@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vgyro.config import MetricsOptions
-from vgyro.metrics import dynamic_errors, dynamic_figures
+from vgyro.metrics import dynamic_errors
+from vgyro.metrics.dynamic_figures import dynamic_figures
 
 RATE_HZ = 500.0
 AMPLITUDE, FREQUENCY = 62.8, 0.25  # Jiang et al. (2012), swing test

@@ -20,9 +20,9 @@ from vgyro.metrics import (
     paper_readings,
     resample,
     spectral_density,
-    static_figures,
 )
 from vgyro.metrics.readings import bias_drift, rrw_read
+from vgyro.metrics.static_figures import static_figures
 
 N, K = 6.17 / 60, 294.28 / 216000  # Jiang et al. (2012), table 2
 OPTIONS = MetricsOptions(bootstrap=200)

@@ -16,9 +16,9 @@ from vgyro.metrics import (
     noise_coefficients,
     paper_readings,
     spectral_density,
-    static_figures,
 )
 from vgyro.metrics.readings import density_ratio
+from vgyro.metrics.static_figures import static_figures
 from vgyro.metrics.static_series import replaced
 
 RATE_HZ = 50.0

@@ -222,7 +222,7 @@ def test_tones_and_covariances_of_the_gyros(tmp_path: Path, board: Board):
 
 
 def test_noise_of_a_recording_full_of_short_losses(tmp_path: Path, board: Board):
-    # Every twentieth sample lost: no run is longer than 0.4 s, yet the noise is that at rest, and so is its correlation.
+    # Every twentieth sample is lost: no run is longer than 0.4 s, yet noise and correlation are those at rest.
     number = len(gyros_of(board))
     rate = white(20_000, number) + N * math.sqrt(RATE_HZ) * np.random.default_rng(8).standard_normal((20_000, 1))
     write_rates(tmp_path, board, rate, np.arange(20_000) % 20 != 0)

@@ -80,7 +80,9 @@ def run_stages(folder: Path, engine: str) -> None:
     rows: dict[str, list[Any]] = {name: [] for name in ("series", "kind", "tau", "deviation", "low", "high", "edf")}
     for index, gyro in enumerate(GYROS):
         curve = allan_deviation(rate[:, index], RATE_HZ, np.array([0.1, 2.0, 30.0]), segment=segment)
-        for values in zip([gyro] * 3, [curve.kind] * 3, curve.tau, curve.deviation, curve.low, curve.high, curve.edf, strict=True):
+        for values in zip(
+            [gyro] * 3, [curve.kind] * 3, curve.tau, curve.deviation, curve.low, curve.high, curve.edf, strict=True
+        ):
             for name, value in zip(rows, values, strict=True):
                 rows[name].append(value)
     write_table(folder / "allan.parquet", rows, "allan", NOTHING)

@@ -1,26 +1,31 @@
 """How good a rate is: Allan deviation, noise coefficients, spectra, dynamic errors, improvement factors, intervals.
 
-Pure functions of arrays in deg/s. docs/metrics.md explains every figure and its convention.
+Pure functions of arrays in deg/s. docs/metrics.md explains every figure and its convention. All figures of a recording
+at once: vgyro.metrics.static_figures and vgyro.metrics.dynamic_figures.
 """
 
-from vgyro.metrics.allan import AllanCurve, allan_deviation, averaging_factors, read_curve, stretches
-from vgyro.metrics.bootstrap import Resampled, Units, block_length, make_units, resample
-from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, model_deviation, noise_coefficients
-from vgyro.metrics.correlation import Correlation, correlation_matrix
-from vgyro.metrics.cross_allan import CrossAllan, cross_allan
-from vgyro.metrics.dynamic import DynamicErrors, dynamic_errors
-from vgyro.metrics.dynamic_figures import dynamic_figures
-from vgyro.metrics.equal_bandwidth import Equaliser, LowPass, common_bandwidth
-from vgyro.metrics.figures import FIGURES, Figure, Reading
-from vgyro.metrics.improvement import improvement_by_draws, improvement_factor, improvement_of_deviation
-from vgyro.metrics.outliers import find_outliers
-from vgyro.metrics.pairs import noise_from_differences
-from vgyro.metrics.readings import counted, moments, paper_readings
-from vgyro.metrics.sampling import Sampling
-from vgyro.metrics.spectrum import Density, Spectrum, flat_band, noise_density, spectral_density, thinned
-from vgyro.metrics.static_figures import StaticFigures, array_figures, static_figures
-from vgyro.metrics.static_series import Measured, RestRecording, without_means, without_outliers
-from vgyro.metrics.tones import Tone, find_tones, share_tones
+from typing import TYPE_CHECKING
+
+from vgyro.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from vgyro.metrics.allan import AllanCurve, allan_deviation, averaging_factors, read_curve, stretches
+    from vgyro.metrics.allan_covariance import CrossAllan, cross_allan
+    from vgyro.metrics.bootstrap import Resampled, Units, block_length, make_units, resample
+    from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, model_deviation, noise_coefficients
+    from vgyro.metrics.correlation import Correlation, correlation_matrix
+    from vgyro.metrics.dynamic import DynamicErrors, dynamic_errors
+    from vgyro.metrics.equal_bandwidth import Equaliser, LowPass, common_bandwidth
+    from vgyro.metrics.figures import FIGURES, Figure, Reading
+    from vgyro.metrics.improvement import improvement_by_draws, improvement_factor, improvement_of_deviation
+    from vgyro.metrics.outliers import find_outliers
+    from vgyro.metrics.pairs import noise_from_differences
+    from vgyro.metrics.readings import counted, moments, paper_readings
+    from vgyro.metrics.sampling import Sampling
+    from vgyro.metrics.spectrum import Density, Spectrum, flat_band, noise_density, spectral_density, thinned
+    from vgyro.metrics.static_figures import StaticFigures, array_figures
+    from vgyro.metrics.static_series import Measured, RestRecording, without_means, without_outliers
+    from vgyro.metrics.tones import Tone, find_tones, share_tones
 
 __all__ = [
     "FIGURES",
@@ -52,7 +57,6 @@ __all__ = [
     "counted",
     "cross_allan",
     "dynamic_errors",
-    "dynamic_figures",
     "find_outliers",
     "find_tones",
     "flat_band",
@@ -70,9 +74,33 @@ __all__ = [
     "resample",
     "share_tones",
     "spectral_density",
-    "static_figures",
     "stretches",
     "thinned",
     "without_means",
     "without_outliers",
 ]
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        **dict.fromkeys(("AllanCurve", "allan_deviation", "averaging_factors", "read_curve", "stretches"), "allan"),
+        **dict.fromkeys(("Resampled", "Units", "block_length", "make_units", "resample"), "bootstrap"),
+        **dict.fromkeys(("Coefficient", "NoiseCoefficients", "model_deviation", "noise_coefficients"), "coefficients"),
+        **dict.fromkeys(("Correlation", "correlation_matrix"), "correlation"),
+        **dict.fromkeys(("CrossAllan", "cross_allan"), "allan_covariance"),
+        **dict.fromkeys(("DynamicErrors", "dynamic_errors"), "dynamic"),
+        **dict.fromkeys(("Equaliser", "LowPass", "common_bandwidth"), "equal_bandwidth"),
+        **dict.fromkeys(("FIGURES", "Figure", "Reading"), "figures"),
+        **dict.fromkeys(("improvement_by_draws", "improvement_factor", "improvement_of_deviation"), "improvement"),
+        "find_outliers": "outliers",
+        "noise_from_differences": "pairs",
+        **dict.fromkeys(("counted", "moments", "paper_readings"), "readings"),
+        "Sampling": "sampling",
+        **dict.fromkeys(
+            ("Density", "Spectrum", "flat_band", "noise_density", "spectral_density", "thinned"), "spectrum"
+        ),
+        **dict.fromkeys(("StaticFigures", "array_figures"), "static_figures"),
+        **dict.fromkeys(("Measured", "RestRecording", "without_means", "without_outliers"), "static_series"),
+        **dict.fromkeys(("Tone", "find_tones", "share_tones"), "tones"),
+    },
+)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.metrics.cross_allan import CrossAllan
+from vgyro.metrics.allan_covariance import CrossAllan
 
 MOST_BLOCKS = 1024
 FEWEST_TAUS = 4

@@ -31,7 +31,7 @@ FIGURES: dict[str, Figure] = {
     ),
     "missing": Figure("Missing", "1", "samples of the series that are lost, within its stretches"),
     "clipped": Figure("Clipped", "1", "samples left out because the gyro or its converter was at a limit"),
-    "outliers": Figure("Outliers", "1", "single samples far outside the noise, left out of Allan deviation and spectrum"),
+    "outliers": Figure("Outliers", "1", "single samples far off the noise, left out of Allan deviation and spectrum"),
     "sigma_equal": Figure(
         "1σ at equal bandwidth", "deg/s", "1σ after the low-pass that brings every series to one bandwidth, DC gain 1"
     ),

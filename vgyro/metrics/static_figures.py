@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro.config import MetricsOptions
+from vgyro.errors import TooShort
 from vgyro.metrics.allan import AllanCurve
+from vgyro.metrics.allan_covariance import CrossAllan, cross_allan
 from vgyro.metrics.array_moments import ArrayMoments, array_moments
 from vgyro.metrics.bootstrap import Resampled, joined, resample
-from vgyro.metrics.cross_allan import CrossAllan, cross_allan
 from vgyro.metrics.drift import Drawn, DriftModel, draw, fit_drift
 from vgyro.metrics.equal_bandwidth import SETTLED, LowPass, common_bandwidth
 from vgyro.metrics.figures import Reading
@@ -189,12 +190,12 @@ class _Array:
 
 
 def _cross(shared: RestRecording, measured: Sequence[Measured]) -> CrossAllan | None:
-    """Allan covariances of the 1 s means of all series; None where no stretch has three of them."""
-    stretches = shared.seconds.stretch
-    if np.bincount(stretches).max(initial=0) < 3:
-        return None
+    """Allan covariances of the 1 s means of all series; None where too few of them are there."""
     means = np.column_stack([one.seconds for one in measured])
-    return cross_allan(means, shared.seconds.rate_hz, shared.seconds, confidence=shared.options.confidence)
+    try:
+        return cross_allan(means, shared.seconds.rate_hz, shared.seconds, confidence=shared.options.confidence)
+    except TooShort:
+        return None
 
 
 def _draw(model: DriftModel, shared: RestRecording, measured: Sequence[Measured], felt: float) -> Drawn:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from vgyro.config import MetricsOptions
-from vgyro.metrics import FIGURES, LowPass, Reading, Sampling, make_units, resample, static_figures
+from vgyro.metrics import FIGURES, LowPass, Reading, Sampling, make_units, resample
+from vgyro.metrics.static_figures import static_figures
 
 Name = tuple[str, str]
 Rows = list[dict[str, Any]]

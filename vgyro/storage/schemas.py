@@ -70,7 +70,7 @@ _ALL = (
     )),
     Schema("effects", 1, "what an ARCH effect of each gyro's level is: changing variance, drift, a tone, or nothing", (
         Column("gyro", "", "gyro"),
-        Column("verdict", "", "heteroskedastic, drift, tone, nothing, or why there is no verdict; several: joined by +"),
+        Column("verdict", "", "heteroskedastic, drift, tone at …, disturbance at …, correlation, nothing; or several"),
         Column("sentence", "", "the verdict in one sentence, with its evidence"),
         Column("p_level", "1", "ARCH-LM of the level"),
         Column("p_detrended", "1", "ARCH-LM without the running mean"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ import pyarrow.parquet as pq
 
 from vgyro.board import Board
 from vgyro.config import MetricsOptions
+from vgyro.errors import TooShort
 from vgyro.metrics import (
     Correlation,
     LowPass,
@@ -22,9 +24,9 @@ from vgyro.metrics import (
     common_bandwidth,
     correlation_matrix,
     counted,
-    dynamic_figures,
     without_outliers,
 )
+from vgyro.metrics.dynamic_figures import dynamic_figures
 from vgyro.storage.tables import read_columns, read_metadata
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.measure_tables import Results, Rows, Series, write_results
@@ -122,7 +124,11 @@ def still_figures(
     engine = task.options["analysis"].get("engine", "native")
     shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses)
     columns = columns_of(series, where, less)
-    measured = [shared.measure(values, one.low_pass) for values, one in zip(columns, series, strict=True)]
+    try:
+        measured = [shared.measure(values, one.low_pass) for values, one in zip(columns, series, strict=True)]
+    except TooShort as reason:
+        logging.warning("no static figures: %s", reason)
+        return None
     figures = array_figures(shared, measured, singles)
     clipped = read_metadata(frame.path).get("clipped", {})
     for one, row in zip(series[:singles], figures.readings, strict=False):

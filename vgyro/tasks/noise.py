@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ import numpy as np
 from vgyro import units
 from vgyro.board import Board
 from vgyro.config import MetricsOptions
+from vgyro.errors import TooShort
 from vgyro.metrics import (
     Coefficient,
     NoiseCoefficients,
@@ -54,9 +56,13 @@ def main(task: Task) -> None:
     frame = read_array(path, [], task.options["axis"])
     places = [(path, gyro) for gyro in gyros]
     sampling = frame.rest_sampling(options.most_lost_s)
+    found = None
     if rests_enough(sampling):
-        found = noise_at_rest(FileColumns(places, frame.at_rest), sampling, options, engine)
-    else:
+        try:
+            found = noise_at_rest(FileColumns(places, frame.at_rest), sampling, options, engine)
+        except TooShort as reason:
+            logging.warning("not from the samples at rest: %s", reason)
+    if found is None:
         found = noise_in_motion(FileColumns(places), frame, engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
 

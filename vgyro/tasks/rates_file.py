@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from vgyro.errors import DataError
-from vgyro.metrics import Sampling
+from vgyro.metrics.sampling import Sampling
 from vgyro.storage.tables import read_batches, read_metadata
 
 
