@@ -31,7 +31,7 @@ def mimu(shared_data: Path) -> dict[str, dict[str, AllanCurve]]:
         rates = np.column_stack([table.column(name).to_numpy() / 16.4 for name in names])
         still = find_rest(rates, MIMU_HZ)
         segment = np.cumsum(np.diff(still, prepend=False))[still]
-        inside = without_means(rates[still], segment)
+        inside = np.column_stack([without_means(column, segment) for column in rates[still].T])
         found[capture] = {
             name.replace("_g", "_"): allan_deviation(inside[:, column], MIMU_HZ, segment=segment)
             for column, name in enumerate(names)
