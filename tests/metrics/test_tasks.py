@@ -231,3 +231,10 @@ def test_noise_of_a_recording_full_of_short_losses(tmp_path: Path, board: Board)
     for gyro in gyros_of(board):
         assert record["arw"][gyro] == pytest.approx(math.sqrt(2) * N, rel=0.03)
     assert record["correlation"][0][1] == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_recording_with_hardly_a_sample_left_is_refused_not_guessed(tmp_path: Path, board: Board):
+    rate = white(12_000, len(gyros_of(board)))
+    write_rates(tmp_path, board, rate, np.random.default_rng(10).random(12_000) < 0.05)
+    assert run_measure(tmp_path, board, "static") == {}
+    assert "differences" in run_noise(tmp_path, board)["method"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.metrics.allan import LONGEST_TAU
 from vgyro.metrics.allan_covariance import CrossAllan
 
 MOST_BLOCKS = 1024
@@ -18,7 +19,6 @@ FLICKER = 2 * math.log(2) / math.pi
 PASSES, SWEEPS = 3, 60
 BATCH = 1 << 19  # numbers that are drawn together
 SMALL = 1e-9
-PER_OCTAVE = 3
 
 
 @dataclass(frozen=True)
@@ -115,18 +115,17 @@ def _drifts(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray) -> bool:
 
 
 def draw(
-    model: DriftModel, stretches: int, seconds: float, longest_tau: float, unit_s: float, replicates: int, seed: int
+    model: DriftModel, stretches: int, seconds: float, taus: np.ndarray, unit_s: float, replicates: int, seed: int
 ) -> Drawn:
     """Draw the series of a model again and again.
 
-    stretches   : how many, each `seconds` long; noise of one does not go on in the next
-    longest_tau : up to which the Allan deviation is looked at, s;  unit_s : shortest block, s
+    stretches : how many, each `seconds` long; noise of one does not go on in the next
+    taus      : at which the Allan deviation is looked at, s, rounded to blocks;  unit_s : shortest block, s
     """
     block_s = unit_s * max(math.ceil(stretches * seconds / unit_s / MOST_BLOCKS), 1)
     blocks = max(int(seconds / block_s), 1)
-    last = min(blocks // 3, int(longest_tau / block_s + SMALL))
-    octaves = np.arange(0, PER_OCTAVE * math.log2(max(last, 1)) + SMALL)
-    factors = np.unique(np.round(2.0 ** (octaves / PER_OCTAVE)).astype(int))
+    factors = np.unique(np.round(taus / block_s).astype(int))
+    factors = factors[(factors >= 1) & (factors <= blocks // LONGEST_TAU)]
     found: list[tuple[np.ndarray, ...]] = []
     sizes: list[np.ndarray] = []
     generator = np.random.default_rng(seed)
@@ -137,14 +136,14 @@ def draw(
             size = model.freedom / generator.chisquare(model.freedom, len(white))
         series = white if drift is None else white + drift * np.sqrt(size)[:, None, None, None]
         apart = [_variance(white), np.zeros(white.shape[:2]) if drift is None else _variance(drift)]
-        lowest = _lowest(series, factors) if last >= 1 else np.full(white.shape[:2], math.nan)
+        lowest = _lowest(series, factors)
         found.append((series.mean(axis=(-2, -1)), _variance(series), lowest, *apart))
         sizes.append(size)
     mean, variance, lowest, of_white, of_drift = (np.concatenate(part) for part in zip(*found, strict=True))
     share = np.concatenate(sizes)[:, None]
     expected = of_white.mean(axis=0) + share * of_drift.mean(axis=0)
     curve, rise = model.variances(factors * block_s)
-    minimum = np.sqrt(np.min(curve[:, None] + share * rise[:, None], axis=0))
+    minimum = np.sqrt(np.min(curve[:, None] + share * rise[:, None], axis=0, initial=math.inf))
     return Drawn(mean, variance, expected, lowest, minimum, block_s)
 
 

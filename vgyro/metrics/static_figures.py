@@ -203,9 +203,9 @@ def _draw(model: DriftModel, shared: RestRecording, measured: Sequence[Measured]
     seconds = len(shared.sampling) / shared.sampling.rate_hz / stretches
     unit_s = shared.grid.unit_s
     shortest = unit_s * max(math.ceil(felt / unit_s), 1)
-    longest_tau = min(float(one.curve.tau[-1]) for one in measured)
+    taus = min((one.curve.tau for one in measured), key=lambda tau: float(tau[-1]))
     options = shared.options
-    return draw(model, stretches, seconds, longest_tau, shortest, options.bootstrap, options.seed)
+    return draw(model, stretches, seconds, taus, shortest, options.bootstrap, options.seed)
 
 
 def _add_equal(readings: list[dict[str, Reading]], shared: RestRecording, array: _Array, confidence: float) -> None:
