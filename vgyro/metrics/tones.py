@@ -53,7 +53,7 @@ class _Floor:
     freedom_level: np.ndarray
 
 
-def find_tones(spectrum: Spectrum, confidence: float = 0.95, false_alarm: float = 0.05) -> list[Tone]:
+def find_tones(spectrum: Spectrum, confidence: float = 0.95, false_alarm: float = 0.001) -> list[Tone]:
     """The lines of a spectrum that noise alone would not show, by rising frequency.
 
     spectrum    : of spectral_density, deg/s; every bin of it (not thinned)
