@@ -9,8 +9,8 @@ from vgyro.calibration.figures import signed, unsigned
 def test_names_in_the_order_of_the_certificate():
     assert list(FIGURES) == [
         "nonlinearity_full_scale", "nonlinearity_reading", "nonlinearity_rms", "asymmetry", "hysteresis",
-        "repeatability", "bias_repeatability", "zero_shift", "scale_temperature", "bias_temperature", "self_heating",
-        "cross_axis",
+        "repeatability", "bias_repeatability", "zero_shift", "zero_offset", "scale_temperature", "bias_temperature",
+        "self_heating", "cross_axis",
     ]  # fmt: skip
     assert all(figure.title and figure.unit and figure.meaning for figure in FIGURES.values())
 

@@ -27,7 +27,14 @@ def test_exact_line():
     assert found.floor_ppm == pytest.approx(0, abs=1e-4)
     assert {name: finding.state for name, finding in found.figures.items()} == {
         **dict.fromkeys(
-            ("nonlinearity_full_scale", "nonlinearity_reading", "nonlinearity_rms", "asymmetry", "zero_shift"),
+            (
+                "nonlinearity_full_scale",
+                "nonlinearity_reading",
+                "nonlinearity_rms",
+                "asymmetry",
+                "zero_shift",
+                "zero_offset",
+            ),
             "below the floor",
         ),
         "hysteresis": "not measured",

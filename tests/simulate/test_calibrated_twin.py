@@ -25,7 +25,7 @@ from vgyro.storage.inputs import read_board
 ROOT = Path(__file__).resolve().parents[2]
 TEMPERATURES = ("cold", "cool", "cycle1", "warm", "hot")
 IN_ONE_TEST = ("scale", "bias", "nonlinearity_full_scale", "nonlinearity_reading", "nonlinearity_rms", "asymmetry",
-               "hysteresis", "zero_shift")  # fmt: skip
+               "hysteresis", "zero_shift", "zero_offset")  # fmt: skip
 QUICK_HZ = 50.0  # the same density of noise, a quarter of the samples
 
 

@@ -37,6 +37,8 @@ def test_the_shipped_twin_holds_its_figures(shipped: Twin, dsp6: Board) -> None:
     assert truth["g1"]["asymmetry"] == pytest.approx(300, abs=0.1)
     assert truth["g1"]["hysteresis"] == pytest.approx(60)
     assert truth["g1"]["scale_temperature"] == -400
+    # An asymmetry a alone bends the line by a/4 of full scale at zero rate (mean of |x| is 1/2), a little more here.
+    assert truth["g6"]["zero_offset"] == pytest.approx(200e-6 / 4 * 300 * 3600, rel=0.1)
     assert truth["g1"]["zero_shift"] == pytest.approx(-30e-6 * 300 * 3600)
     assert truth["g2"]["nonlinearity_full_scale"] == pytest.approx(0, abs=1e-6)
     assert truth["g3"]["nonlinearity_full_scale"] == pytest.approx(50, abs=0.1)

@@ -65,6 +65,9 @@ FIGURES: dict[str, Figure] = {
         "Repeatability of the bias", "deg/h", "σ of the bias over the power cycles, noise of each taken off"
     ),
     "zero_shift": Figure("Zero shift", "deg/h", "output at zero rate after the test minus before it"),
+    "zero_offset": Figure(
+        "Output at zero rate", "deg/h", "output at zero rate minus the straight line's: what its bend makes of rest"
+    ),
     "scale_temperature": Figure(
         "Scale factor against temperature", "ppm/K", "slope of S over S, from tests at different temperatures"
     ),

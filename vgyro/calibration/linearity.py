@@ -1,4 +1,4 @@
-"""Figures of a response to a table: nonlinearity, asymmetry, hysteresis, zero shift (IEEE Std 1431-2004)."""
+"""Figures of a response to a table: nonlinearity, asymmetry, hysteresis, zero rate (IEEE Std 1431-2004)."""
 
 from __future__ import annotations
 
@@ -73,6 +73,14 @@ def zero_shift(response: Response, scale: float, confidence: float) -> Finding:
     error = abs(factor) * float(np.sqrt(noise[first, first] + noise[last, last] - 2 * noise[first, last]))
     half = student(response.fit.freedom, confidence) * error
     return signed(factor * float(visits.count[last] - visits.count[first]), half, MEDIAN_OF_NOISE * error)
+
+
+def zero_offset(response: Response, scale: float, confidence: float) -> Finding:
+    """Output at zero rate minus that of the straight line, deg/h; scale deg/s a count, with the gyro's sign."""
+    at_zero = np.flatnonzero(np.abs(response.model.rates) <= SAME_RATE * response.model.visits.largest)
+    if not at_zero.size or not response.bends:
+        return not_measured("needs a plateau at zero rate, and rates enough to tell a bend from noise")
+    return combined(response, float(units.deg_h(scale)) * response.bend[at_zero[0]], confidence)
 
 
 def combined(response: Response, combination: np.ndarray, confidence: float, note: str = "") -> Finding:

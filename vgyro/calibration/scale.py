@@ -9,7 +9,7 @@ import numpy as np
 
 from vgyro import units
 from vgyro.calibration.figures import BELOW, Finding, not_measured
-from vgyro.calibration.linearity import asymmetry, combined, hysteresis, nonlinearity, zero_shift
+from vgyro.calibration.linearity import asymmetry, combined, hysteresis, nonlinearity, zero_offset, zero_shift
 from vgyro.calibration.plateaus import PlateauMeans
 from vgyro.calibration.response import Response, Visits, fit_response, same_rates
 from vgyro.errors import DataError, TooShort
@@ -162,6 +162,7 @@ def _scale_fit(
         "asymmetry": asymmetry(response, confidence),
         "hysteresis": hysteresis(response, scale, full_scale, confidence),
         "zero_shift": zero_shift(response, gyro.sign * scale, confidence),
+        "zero_offset": zero_offset(response, gyro.sign * scale, confidence),
     }
     seen = np.abs(response.seen_bend @ visits.count).max() * scale / full_scale
     error = means.standard_error[usable, column] * scale

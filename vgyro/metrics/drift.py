@@ -14,7 +14,8 @@ from vgyro.metrics.allan_covariance import CrossAllan
 MOST_BLOCKS = 1024
 FEWEST_TAUS = 4
 EVIDENCE = 0.05
-KNOWN_AT, FEWEST_FREEDOM = 0.6, 3.0  # of the longest τ, which is a third of the recording
+WITHIN, WHOLE = 0.3, 0.6  # of the longest τ: a tenth and a fifth of the recording
+FEWEST_FREEDOM = 3.0
 FLICKER = 2 * math.log(2) / math.pi
 PASSES, SWEEPS = 3, 60
 BATCH = 1 << 19  # numbers that are drawn together
@@ -25,13 +26,15 @@ SMALL = 1e-9
 class DriftModel:
     """Covariances [S, S] of white noise (deg/s)²/Hz, flicker (deg/s)² and random walk (deg/s)²/s of S series.
 
-    freedom : degrees of freedom that the size of flicker and walk is known with
+    freedom, freedom_of_mean : degrees of freedom with which the size of flicker and walk is known within the recording,
+    and at its whole length
     """
 
     white: np.ndarray
     flicker: np.ndarray
     walk: np.ndarray
     freedom: float
+    freedom_of_mean: float
 
     @property
     def drifts(self) -> bool:
@@ -88,7 +91,7 @@ def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftMo
     Least squares of C(τ) = W/τ + (2 ln2/π)F + Kτ/3 with weights edf/σ⁴, each matrix positive semidefinite: one is
     fitted at a time and cut at zero, until it settles. What such a fit says of the variance of the mean of the whole
     recording scatters as chi² with the degrees of freedom that σ² has at a fifth of the recording (by simulation 3.2;
-    the edf of a random walk there is 3.1).
+    the edf of a random walk there is 3.1). What varies within the recording is known better: as σ² at a tenth of it.
     """
     freedom = np.diagonal(found.edf, axis1=1, axis2=2)[:, :singles].mean(axis=1)
     used = (found.tau >= shortest * (1 - SMALL)) & (freedom >= 1)
@@ -96,8 +99,9 @@ def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftMo
     if len(tau) < FEWEST_TAUS or not np.all(np.diagonal(covariance[0]) > 0):
         return None
     terms = 3 if _drifts(tau, covariance[:, :singles, :singles], edf) else 1
-    known = edf[max(int(np.searchsorted(tau, KNOWN_AT * tau[-1], side="right")) - 1, 0)]
-    return _fit(tau, covariance, edf, terms, max(float(known), FEWEST_FREEDOM))
+    white, flicker, walk = _fit(tau, covariance, edf, terms)
+    known = [edf[max(int(np.searchsorted(tau, share * tau[-1], side="right")) - 1, 0)] for share in (WITHIN, WHOLE)]
+    return DriftModel(white, flicker, walk, *(max(float(one), FEWEST_FREEDOM) for one in known))
 
 
 def _drifts(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray) -> bool:
@@ -128,23 +132,25 @@ def draw(
     factors = factors[(factors >= 1) & (factors <= blocks // LONGEST_TAU)]
     found: list[tuple[np.ndarray, ...]] = []
     sizes: list[np.ndarray] = []
-    generator = np.random.default_rng(seed)
+    generator, known = np.random.default_rng(seed), (model.freedom, model.freedom_of_mean)
     for white, drift in _series(model, stretches, blocks, block_s, replicates, generator):
         # How large the drift is, is not known: its variance is freedom/χ² times the one found.
-        size = np.full(len(white), 1.0)
+        size, series, mean = np.ones(len(white)), white, white.mean(axis=(-2, -1))
+        apart = [_variance(white), np.zeros(white.shape[:2])]
         if drift is not None:
-            size = model.freedom / generator.chisquare(model.freedom, len(white))
-        series = white if drift is None else white + drift * np.sqrt(size)[:, None, None, None]
-        apart = [_variance(white), np.zeros(white.shape[:2]) if drift is None else _variance(drift)]
+            size, whole = (free / generator.chisquare(free, len(white)) for free in known)
+            series = white + drift * np.sqrt(size)[:, None, None, None]
+            mean = mean + drift.mean(axis=(-2, -1)) * np.sqrt(whole)[:, None]
+            apart[1] = _variance(drift)
         lowest = _lowest(series, factors)
-        found.append((series.mean(axis=(-2, -1)), _variance(series), lowest, *apart))
+        found.append((mean, _variance(series), lowest, *apart))
         sizes.append(size)
-    mean, variance, lowest, of_white, of_drift = (np.concatenate(part) for part in zip(*found, strict=True))
+    means, variance, lowests, of_white, of_drift = (np.concatenate(part) for part in zip(*found, strict=True))
     share = np.concatenate(sizes)[:, None]
     expected = of_white.mean(axis=0) + share * of_drift.mean(axis=0)
     curve, rise = model.variances(factors * block_s)
     minimum = np.sqrt(np.min(curve[:, None] + share * rise[:, None], axis=0, initial=math.inf))
-    return Drawn(mean, variance, expected, lowest, minimum, block_s)
+    return Drawn(means, variance, expected, lowests, minimum, block_s)
 
 
 def _variance(series: np.ndarray) -> np.ndarray:
@@ -156,8 +162,8 @@ def _basis(tau: np.ndarray) -> np.ndarray:
     return np.column_stack([1 / tau, np.full(len(tau), FLICKER), tau / 3])
 
 
-def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int, freedom: float) -> DriftModel:
-    """number : of the terms that are fitted, in the order white, flicker, walk"""
+def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int) -> np.ndarray:
+    """White, flicker and walk [3, S, S];  number : of these that are fitted, the others are 0"""
     scale = np.sqrt(np.diagonal(covariance[0]) * tau[0])
     scale = np.where(scale > 0, scale, 1.0)
     size = np.outer(scale, scale)
@@ -174,8 +180,7 @@ def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int, 
                 others = left[term] - sum(gram[term, other] * terms[other] for other in range(number) if other != term)
                 terms[term] = _positive(others / gram[term, term])
         level = basis @ np.trace(terms, axis1=1, axis2=2)
-    white, flicker, walk = terms * size
-    return DriftModel(white, flicker, walk, freedom)
+    return terms * size
 
 
 def _positive(matrix: np.ndarray) -> np.ndarray:
@@ -211,7 +216,7 @@ def _series(
 def _mixed(root: np.ndarray, unit: np.ndarray) -> np.ndarray:
     """root [S, r] · unit [n, r, stretches, blocks] → [n, S, stretches, blocks]."""
     count, rank, *rest = unit.shape
-    return (root @ unit.reshape(count, rank, -1)).reshape(count, len(root), *rest)
+    return (root @ unit.reshape(count, rank, math.prod(rest))).reshape(count, len(root), *rest)
 
 
 def _unit_flicker(generator: np.random.Generator, shape: tuple[int, ...], blocks: int) -> np.ndarray:

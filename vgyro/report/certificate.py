@@ -28,7 +28,7 @@ MAIN = (
     ("scale", Figure("Scale factor", "deg/s a count", "slope of the table's rate over the output")),
     (
         "bias",
-        Figure("Zero-rate output", "counts", "output at rest, of the straight line; Earth rate removed if stated"),
+        Figure("Bias", "counts", "the straight line at zero rate; Earth rate removed if stated"),
     ),
 )
 
@@ -166,7 +166,7 @@ def _number(value: float | None) -> float:
 
 def applied(gyros: Mapping[str, Record]) -> list[str]:
     """What the conversion of the recordings does with this calibration, in sentences."""
-    found = ["rate = sign · (count − zero-rate output) · scale factor, both as above."]
+    found = ["rate = sign · (count − bias) · scale factor, both as above."]
     compensated: dict[str, dict[str, list[str]]] = {}
     plain_ones: dict[str, list[str]] = {}
     for name, record in gyros.items():
@@ -186,7 +186,7 @@ def applied(gyros: Mapping[str, Record]) -> list[str]:
         names = [name for members in sensors.values() for name in members]
         by = ", ".join(sensors)
         found.append(
-            f"Compensated for temperature by {by}: zero-rate output by its polynomial, scale factor by its slope, for "
+            f"Compensated for temperature by {by}: bias by its polynomial, scale factor by its slope, for "
             f"{_names(names, gyros)} ({words})."
         )
     found += [

@@ -81,7 +81,7 @@ def _with_temperature(gyros: Mapping[str, Record]) -> list[tuple[int, str, Recor
 
 
 def _bias_plot(axis: str, gyros: Mapping[str, Record]) -> Markup:
-    """Zero-rate output against temperature, in deg/s from that at the reference temperature, and its polynomial."""
+    """Bias against temperature, in deg/s from that at the reference temperature, and its polynomial."""
     curves = []
     for index, name, record, about in _with_temperature(gyros):
         reference, scale = float(about["reference_c"]), float(record["scale"])
@@ -99,10 +99,8 @@ def _bias_plot(axis: str, gyros: Mapping[str, Record]) -> Markup:
             )
     if not curves:
         return Markup("")
-    title, y = "Zero-rate output against temperature", Axis("less that at the reference, deg/s")
-    summary = (
-        "the curve is laid through the line's zero-rate output; points beside it: bend of the line, other power cycles"
-    )
+    title, y = "Bias against temperature", Axis("less that at the reference, deg/s")
+    summary = "the curve is laid through the line's bias; points beside it: bend of the line, other power cycles"
     return curve_plot(
         f"bias-temperature-{axis}",
         title,

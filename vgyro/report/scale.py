@@ -22,7 +22,7 @@ COLUMNS = (
     Column("axis", numeric=False),
     Column("scale from", numeric=False),
     Column("scale", "deg/s a count"),
-    Column("zero-rate output", "counts"),
+    Column("bias", "counts"),
     Column("remark", numeric=False),
 )
 

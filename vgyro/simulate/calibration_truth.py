@@ -41,7 +41,8 @@ def calibration_truth(twin: Twin, board: Board, recording: str) -> dict[str, dic
     largest and r.m.s. over full scale, largest over the rate itself from a tenth of full scale on. asymmetry (ppm):
     slopes of the lines through the rates from 0 up and from 0 down, their difference over their mean. hysteresis (ppm
     of full scale): largest |output reached from below - from above| at one rate (NaN if none is met both ways).
-    zero_shift (deg/h): last zero rate minus first. scale_temperature (ppm/K): of the sensitivity, over that at
+    zero_shift (deg/h): last zero rate minus first. zero_offset (deg/h): output minus line at zero rate.
+    scale_temperature (ppm/K): of the sensitivity, over that at
     reference_c. Flicker and random walk are noise here: they are left out.
     raises : DataError for a recording that is not on a rate table
     """
@@ -121,6 +122,7 @@ def _figures(points: TruePoints, twin: Twin, spec: TwinRecording, gyro: Gyro) ->
         "bias": gyro.bias + gyro.sign * (1.0 + truth.scale_error) * float(offset) / gyro.scale,
         **{name: parts_per_million(float(ratio)) for name, ratio in ratios.items()},
         "zero_shift": deg_h(float(zeros[-1] - zeros[0])) if zeros.size > 1 else float("nan"),
+        "zero_offset": deg_h(float(residual[_at_zero(points.rate)].mean())) if zeros.size else float("nan"),
         "scale_temperature": truth.scale_temperature_ppm_k,
     }
 
