@@ -60,8 +60,11 @@ class Equaliser:
         low_pass : what it went through. A first-order low-pass of another bandwidth is undone exactly, sample by
         sample, before the common one is put on: lead-lag; a series that is at the common bandwidth stays as it is.
         """
-        pieces = [self._run(values[start:stop], low_pass) for start, stop in self.runs]
-        return np.concatenate([np.empty(0), *pieces]) / low_pass.dc_gain
+        cuts = self.cuts
+        found = np.empty(cuts[-1][1] if cuts else 0)
+        for (first, last), (start, stop) in zip(cuts, self.runs, strict=True):
+            np.divide(self._run(values[start:stop], low_pass), low_pass.dc_gain, out=found[first:last])
+        return found
 
     def _run(self, values: np.ndarray, low_pass: LowPass) -> np.ndarray:
         own = low_pass.bandwidth_hz

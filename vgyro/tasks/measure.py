@@ -72,9 +72,11 @@ def main(task: Task) -> None:
         rows = with_dynamic(rows, Rows(series, moving, 0.0))
     if still is not None and still.true_rate == 0:
         rows += moved_figures(task.input("moved"), series, len(gyros), still)
+    figures = None if still is None else still.figures
+    # Its sums and sampling are not wanted while the correlation holds several columns.
+    del still
     correlation = noise_correlation(columns_of(series[: len(gyros)]), frame, reference, options)
     of = "samples at rest" if frame.at_rest.any() else "rate - reference"
-    figures = None if still is None else still.figures
     write_results(task, Results(series, len(gyros), rows, figures, correlation, of, frame.rate_hz), options.confidence)
 
 
@@ -164,13 +166,14 @@ def noise_correlation(
     """Correlation of the noise at rest; of the errors where the board moves and the true rate is known; else NaN."""
     if frame.at_rest.any():
         rest = frame.rest_sampling(options.most_lost_s)
-        segment = rest.segment
+        segment, stretch = rest.segment, rest.stretch
+        del rest
 
         def cleaned(rate: np.ndarray) -> np.ndarray:
             return without_outliers(rate, frame.rate_hz, segment, options.outlier_threshold)[0]
 
         columns = replace(gyros, where=frame.at_rest, cleaned=cleaned)
-        return correlation_matrix(columns, frame.rate_hz, rest.stretch, options.confidence)
+        return correlation_matrix(columns, frame.rate_hz, stretch, options.confidence)
     if reference is not None and np.isfinite(reference).sum() > len(gyros):
         known = np.isfinite(reference)
         moving = replace(gyros, where=known)
