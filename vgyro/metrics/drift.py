@@ -208,7 +208,9 @@ def _series(
         drift = None
         if model.drifts:
             steps = generator.standard_normal((count, walk.shape[1], *shape[1:]))
-            drift = _mixed(walk, np.cumsum(steps, axis=-1)) * math.sqrt(block_s)
+            # A walk's mean over a block: halfway between its ends, and what it wanders between them (Brownian bridge).
+            means = np.cumsum(steps, axis=-1) - steps / 2 + generator.standard_normal(steps.shape) / math.sqrt(12)
+            drift = _mixed(walk, means) * math.sqrt(block_s)
             drift += _mixed(flicker, _unit_flicker(generator, (count, flicker.shape[1], stretches), blocks))
         yield noise, drift
 
