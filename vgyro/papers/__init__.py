@@ -1,6 +1,6 @@
 """The tables and claims of the two papers as data, what follows from their equations, and how they are judged.
 
-Jiang et al. (2012), Sensors 12, 1720-1737, and Liu et al. (2015), Sensors 15, 13625-13645 (see the YAML files).
+Jiang et al. (2012), Sensors 12, 1720-1737, and Liu et al. (2015), Micromachines 6, 684-698 (see the YAML files).
 """
 
 from __future__ import annotations
