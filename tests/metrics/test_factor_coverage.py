@@ -17,8 +17,8 @@ WEIGHTS = {"average": np.full(GYROS, 1 / GYROS), "unequal": np.array([0.35, 0.25
 LOW_PASS = LowPass(BANDWIDTH_HZ)
 FACTORS = ("if_mean", "if_sigma", "if_sigma_equal", "if_arw", "if_arw_1s", "if_bias_drift")
 BAND = 0.90, 0.98  # of 200 runs, in which the interval shall hold the true factor
-# Reached with drift: 0.97 to 0.99, wider than it need be. It is the longest τ that widens it: without that one, in which
-# there are fewest degrees of freedom, 0.93 to 0.96 of 100 runs. The figure itself looks at all τ, so it stays.
+# Reached with drift: 0.97 to 0.99, wider than it need be. The longest τ widens it: without that one, of the fewest
+# degrees of freedom, the share is 0.93 to 0.96 of 100 runs. The figure itself looks at all τ, so it stays.
 TOO_WIDE = {"if_bias_drift": 0.995}
 RUNS = 200
 FLICKER = 2 * math.log(2) / math.pi

@@ -80,16 +80,16 @@ def array_moments(
         note = f"bootstrap of blocks of {sigmas.blocks['sigma'] * unit_s:g} s"
         centre = np.median(sigmas.sigma, axis=0)
         return ArrayMoments(mean, sigma, resampled.mean, sigmas.sigma, centre, note)
-    squares = _about_block_means(spread, max(round(drawn.block_s / unit_s), 1))
-    within = squares.sum(axis=0) / spread.count.sum()
-    block = max(block_length(column / spread.count) for column in squares.T)
+    squares, count = _about_block_means(spread, max(round(drawn.block_s / unit_s), 1))
+    within = squares.sum(axis=0) / count.sum()
+    block = max(block_length(column / count) for column in squares.T)
     shape = options.bootstrap, -(-len(squares) // block)
     starts = np.random.default_rng(options.seed).integers(0, len(squares) - block + 1, shape)
-    fast = block_sums(squares, starts, block) / block_sums(spread.count[:, None], starts, block)
+    fast = block_sums(squares, starts, block) / block_sums(count[:, None], starts, block)
     sigma_drawn = np.sqrt(np.maximum(fast, 0) + drawn.variance)
     with np.errstate(invalid="ignore", divide="ignore"):
         wider = np.fmax(np.std(resampled.mean, axis=0) / np.std(drawn.mean, axis=0), 1.0)
-    note = f"bootstrap of blocks of {block * unit_s:g} s, the fitted drift drawn again"
+    note = f"bootstrap of blocks of {block * drawn.block_s:g} s, the fitted drift drawn again"
     return ArrayMoments(
         mean, sigma, mean + drawn.mean * wider, sigma_drawn, np.sqrt(within + drawn.variance_expected), note
     )  # fmt: skip
@@ -105,12 +105,15 @@ def _sigma(sums: Units) -> np.ndarray:
     return np.sqrt(np.maximum(squares, 0) / max(count - 1, 1))
 
 
-def _about_block_means(sums: Units, units: int) -> np.ndarray:
-    """Squares [U, S] about the mean of the block of `units` units that each unit lies in."""
+def _about_block_means(sums: Units, units: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of squares [B, S] of blocks of `units` units about the mean of each, and samples in it [B]."""
     block = np.arange(len(sums.count)) // units
     count = np.bincount(block, sums.count)
-    found = np.empty_like(sums.total)
+    found = np.empty((len(count), sums.total.shape[1]))
     for column, (total, squares) in enumerate(zip(sums.total.T, sums.squares.T, strict=True)):
-        mean = (np.bincount(block, total) / count)[block]
-        found[:, column] = squares - 2 * mean * total + mean**2 * sums.count
-    return found
+        # About the unit's own mean first: a large bias would cancel badly.
+        mean = total / sums.count
+        of_block = np.bincount(block, total) / count
+        inside = squares - total * mean
+        found[:, column] = np.bincount(block, inside + sums.count * (mean - of_block[block]) ** 2)
+    return found, count

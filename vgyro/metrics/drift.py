@@ -14,7 +14,7 @@ from vgyro.metrics.allan_covariance import CrossAllan
 MOST_BLOCKS = 1024
 FEWEST_TAUS = 4
 EVIDENCE = 0.05
-WITHIN, WHOLE = 0.3, 0.6  # of the longest τ: a tenth and a fifth of the recording
+KNOWN_AT = 0.6  # of the longest τ: a fifth of the recording
 FEWEST_FREEDOM = 3.0
 FLICKER = 2 * math.log(2) / math.pi
 PASSES, SWEEPS = 3, 60
@@ -26,15 +26,13 @@ SMALL = 1e-9
 class DriftModel:
     """Covariances [S, S] of white noise (deg/s)²/Hz, flicker (deg/s)² and random walk (deg/s)²/s of S series.
 
-    freedom, freedom_of_mean : degrees of freedom with which the size of flicker and walk is known within the recording,
-    and at its whole length
+    freedom : degrees of freedom that the size of flicker and walk is known with
     """
 
     white: np.ndarray
     flicker: np.ndarray
     walk: np.ndarray
     freedom: float
-    freedom_of_mean: float
 
     @property
     def drifts(self) -> bool:
@@ -91,7 +89,7 @@ def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftMo
     Least squares of C(τ) = W/τ + (2 ln2/π)F + Kτ/3 with weights edf/σ⁴, each matrix positive semidefinite: one is
     fitted at a time and cut at zero, until it settles. What such a fit says of the variance of the mean of the whole
     recording scatters as chi² with the degrees of freedom that σ² has at a fifth of the recording (by simulation 3.2;
-    the edf of a random walk there is 3.1). What varies within the recording is known better: as σ² at a tenth of it.
+    the edf of a random walk there is 3.1).
     """
     freedom = np.diagonal(found.edf, axis1=1, axis2=2)[:, :singles].mean(axis=1)
     used = (found.tau >= shortest * (1 - SMALL)) & (freedom >= 1)
@@ -100,8 +98,8 @@ def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftMo
         return None
     terms = 3 if _drifts(tau, covariance[:, :singles, :singles], edf) else 1
     white, flicker, walk = _fit(tau, covariance, edf, terms)
-    known = [edf[max(int(np.searchsorted(tau, share * tau[-1], side="right")) - 1, 0)] for share in (WITHIN, WHOLE)]
-    return DriftModel(white, flicker, walk, *(max(float(one), FEWEST_FREEDOM) for one in known))
+    known = edf[max(int(np.searchsorted(tau, KNOWN_AT * tau[-1], side="right")) - 1, 0)]
+    return DriftModel(white, flicker, walk, max(float(known), FEWEST_FREEDOM))
 
 
 def _drifts(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray) -> bool:
@@ -132,25 +130,23 @@ def draw(
     factors = factors[(factors >= 1) & (factors <= blocks // LONGEST_TAU)]
     found: list[tuple[np.ndarray, ...]] = []
     sizes: list[np.ndarray] = []
-    generator, known = np.random.default_rng(seed), (model.freedom, model.freedom_of_mean)
+    generator = np.random.default_rng(seed)
     for white, drift in _series(model, stretches, blocks, block_s, replicates, generator):
         # How large the drift is, is not known: its variance is freedom/χ² times the one found.
-        size, series, mean = np.ones(len(white)), white, white.mean(axis=(-2, -1))
+        size, series = np.ones(len(white)), white
         apart = [_variance(white), np.zeros(white.shape[:2])]
         if drift is not None:
-            size, whole = (free / generator.chisquare(free, len(white)) for free in known)
+            size = model.freedom / generator.chisquare(model.freedom, len(white))
             series = white + drift * np.sqrt(size)[:, None, None, None]
-            mean = mean + drift.mean(axis=(-2, -1)) * np.sqrt(whole)[:, None]
             apart[1] = _variance(drift)
-        lowest = _lowest(series, factors)
-        found.append((mean, _variance(series), lowest, *apart))
+        found.append((series.mean(axis=(-2, -1)), _variance(series), _lowest(series, factors), *apart))
         sizes.append(size)
-    means, variance, lowests, of_white, of_drift = (np.concatenate(part) for part in zip(*found, strict=True))
+    mean, variance, lowest, of_white, of_drift = (np.concatenate(part) for part in zip(*found, strict=True))
     share = np.concatenate(sizes)[:, None]
     expected = of_white.mean(axis=0) + share * of_drift.mean(axis=0)
     curve, rise = model.variances(factors * block_s)
     minimum = np.sqrt(np.min(curve[:, None] + share * rise[:, None], axis=0, initial=math.inf))
-    return Drawn(means, variance, expected, lowests, minimum, block_s)
+    return Drawn(mean, variance, expected, lowest, minimum, block_s)
 
 
 def _variance(series: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ from vgyro.metrics.static_series import Measured, RestRecording, without_means
 
 POSE_NOTE = "each pose's own mean is removed"
 RESOLVED = 3  # blocks of the drawn series that the minimum of a curve must span
+BLOCKS_APART = 2.5  # times what is left out of the fit: blocks of 20 time constants are as good as independent
 
 __all__ = ["LowPass", "StaticFigures", "array_figures", "static_figures", "without_means"]
 
@@ -202,7 +203,7 @@ def _draw(model: DriftModel, shared: RestRecording, measured: Sequence[Measured]
     stretches = len(np.unique(shared.sampling.stretch)) if shared.poses else 1
     seconds = len(shared.sampling) / shared.sampling.rate_hz / stretches
     unit_s = shared.grid.unit_s
-    shortest = unit_s * max(math.ceil(felt / unit_s), 1)
+    shortest = unit_s * max(math.ceil(BLOCKS_APART * felt / unit_s), 1)
     taus = min((one.curve.tau for one in measured), key=lambda tau: float(tau[-1]))
     options = shared.options
     return draw(model, stretches, seconds, taus, shortest, options.bootstrap, options.seed)
