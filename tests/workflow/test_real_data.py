@@ -74,5 +74,5 @@ def test_the_bad_gyros_of_the_mimu_board_are_named(lab, output: str) -> None:
 def test_the_arch_effect_of_the_adis_is_drift_but_for_the_knock(lab, output: str) -> None:
     text = sentences(lab, "adis16405")
     assert output
-    assert re.search(r"rec2: 1 of 1 gyros; detrended: 0; it is drift", text), text
-    assert re.search(r"rec4: 1 of 1 gyros; detrended: 1; it is more than drift", text), text
+    assert re.search(r"axis x, rec2\): drift: gyro_x\.", text), text
+    assert re.search(r"axis x, rec4\): drift \+ disturbance: gyro_x\.", text), text
