@@ -23,7 +23,7 @@ ARCH_RULE = (
     "short disturbances still rejects; else it is called what makes the test reject. The levels of the tests are such "
     "that white noise gets any verdict but “nothing” in less than 5 % of cases."
 )
-COLUMNS = (Column("gyro", numeric=False), Column("verdict", numeric=False), Column("why", numeric=False))
+COLUMNS = (Column("gyro", numeric=False), Column("verdict", numeric=False), Column("why", numeric=False, wide=True))
 
 
 def verdicts(array: ArrayPart) -> dict[str, list[str]]:

@@ -16,13 +16,17 @@ Tone = Literal["", "good", "bad", "warn", "muted", "best"]
 
 @dataclass(frozen=True)
 class Column:
-    """One column. unit : printed under the title; numeric : right-aligned, figures of one width; hint : tooltip"""
+    """One column. unit : printed under the title; numeric : right-aligned, figures of one width; hint : tooltip
+
+    wide : holds sentences; a narrow page scrolls rather than break them into words
+    """
 
     title: str
     unit: str = ""
     numeric: bool = True
     hint: str = ""
     group: str = ""
+    wide: bool = False
 
 
 @dataclass(frozen=True)
