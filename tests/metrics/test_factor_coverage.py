@@ -17,7 +17,7 @@ WEIGHTS = {"average": np.full(GYROS, 1 / GYROS), "unequal": np.array([0.35, 0.25
 LOW_PASS = LowPass(BANDWIDTH_HZ)
 FACTORS = ("if_mean", "if_sigma", "if_sigma_equal", "if_arw", "if_arw_1s", "if_bias_drift")
 BAND = 0.90, 0.98  # of 200 runs, in which the interval shall hold the true factor
-# What of it is not reached: drift or not, virtual gyro, factor. With drift the intervals of two factors are too wide; the
+# What of it is not reached: drift or not, virtual gyro, factor. With drift two intervals are wider than need be; the
 # longest τ, of the fewest degrees of freedom, does that to the minimum of a curve. 200 runs tell a share to 0.01-0.02.
 NOT_REACHED = {
     (True, 0, "if_bias_drift"): 0.99,
