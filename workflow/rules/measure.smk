@@ -17,7 +17,7 @@ rule measure:
     benchmark:
         "results/benchmarks/{dataset}/{recording}/{axis}/measure.tsv"
     resources:
-        mem_mb=1500,
+        mem_mb=2000,
         runtime=60,
     params:
         options=stage("board", "engine", "metrics"),
