@@ -19,6 +19,7 @@ PARTIAL = "partial"
 
 DEFINITIONS: tuple[Definition, ...] = ("level", "demeaned", "difference", "residual")
 MODES: tuple[Mode, ...] = ("in_sample", "causal")
+MODELS: tuple[CorrelationModel, ...] = ("dcc", "ccc")
 
 
 class IntegrityOptions(StrictModel):
@@ -63,7 +64,7 @@ class VolatilityOptions(StrictModel):
         MODES, min_length=1, description="in_sample: variance of the window's own samples; causal: of later ones only"
     )
     models: tuple[CorrelationModel, ...] = Field(
-        ("dcc", "ccc"), min_length=1, description="dcc: correlation changes with time; ccc: it does not"
+        MODELS, min_length=1, description="dcc: correlation changes with time; ccc: it does not"
     )
     arch_lags: int = Field(1, ge=1, description="lags of the ARCH-LM test")
     residual_span: int = Field(15, ge=3, description="samples averaged for the rate that `residual` removes")

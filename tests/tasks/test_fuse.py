@@ -212,6 +212,17 @@ def test_no_rate_is_added(analysed, keywords, reason):
     assert reason in said["dcc_causal[level]"]
 
 
+def test_level_weights_of_single_samples_are_not_estimated_again(tmp_path):
+    write_inputs(tmp_path)
+    time = read_columns(tmp_path / "rates.parquet")["time"]
+    (tmp_path / "level").mkdir()
+    write_weights(tmp_path / "level/weights.parquet", time, [("dcc", "in_sample")], row_group=4000)
+    _, methods = fuse_in(tmp_path, ["level/weights.parquet"], analysis=FULL, injected_rate=INJECTED)
+    said = dict(zip(methods["column"], methods["moved"], strict=True))
+    assert said["dcc_in_sample[level]"] == f"not known: {fusion_inputs.NOT_AT_FULL_RATE}."
+    assert said["ewma_causal"] == "ewma_causal"
+
+
 def test_a_response_that_is_not_declared_is_measured(analysed, monkeypatch):
     # A mean of three samples, the last one of them its own: 1 sample late.
     def smooth(array, parameters):  # noqa: ARG001

@@ -1,9 +1,9 @@
 """The demo board on both engines: C kernels and libraries must tell the same story.
 
 Tolerances. Figures without a fitted window: 1e-9 of their size. Figures of DCC and CCC weights: a tenth of the width of
-their own 95 % interval, because two searches may end on different points of a flat likelihood. Likelihoods: a search that
-starts from a grid misses the best of several optima now and then. The bounds are those of the tests of the engine: worse by
-more than 1e-5 a sample in less than 0.5 % of the windows, by 1e-3 in none.
+their own 95 % interval, because two searches may end on different points of a flat likelihood. Likelihoods: a search
+that starts from a grid misses the best of several optima now and then. The bounds are those of the tests of the engine:
+worse by more than 1e-5 a sample in less than 0.5 % of the windows, by 1e-3 in none.
 """
 
 import shutil

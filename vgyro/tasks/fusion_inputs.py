@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from vgyro.board import Board
-from vgyro.config import FusionOptions, VolatilityOptions
+from vgyro.config import MODELS, MODES, FusionOptions, VolatilityOptions
 from vgyro.dataset import AT_REST
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights, block_of_sample
 from vgyro.fusion.array import WeightKey
@@ -22,6 +22,8 @@ from vgyro.tasks.rates_file import ArrayFile, read_array
 from vgyro.tasks.volatility_series import LEVEL, MOVED
 
 T = TypeVar("T")
+
+NOT_AT_FULL_RATE = "at volatility.rate_hz: full the weights of the level are not estimated a second time"
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,10 @@ class OpenArray:
         for column in self.rates.rate.T:
             column += self.injected_rate
         weights = _of_moved_level(self.rates.weights)
-        return replace(self.rates, weights=weights, no_weights=_of_moved_level(self.rates.no_weights))
+        reasons: dict[WeightKey, str] = _of_moved_level(self.rates.no_weights)
+        if self.volatility.rate_hz == "full":
+            reasons = {(model, mode, LEVEL): NOT_AT_FULL_RATE for model in MODELS for mode in MODES}
+        return replace(self.rates, weights=weights, no_weights=reasons)
 
 
 def _of_moved_level(known: Mapping[WeightKey, T]) -> dict[WeightKey, T]:

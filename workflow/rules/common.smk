@@ -200,10 +200,14 @@ def injected_rate(wildcards):
 
 
 def moved_weights_of(wildcards):
-    """Weights of the level with a constant rate added, for a recording at rest: those of `level` shrink toward zero."""
+    """Weights of the level with a constant rate added, for a recording at rest: those of `level` shrink toward zero.
+
+    Not at the full rate, where every window fitted again would be most of the work.
+    """
     wanted = (
         injected_rate(wildcards) is not None
         and "level" in definitions(wildcards.dataset)
+        and analysis_of(wildcards.dataset).volatility.rate_hz != "full"
         and has_volatility(wildcards.dataset, wildcards.recording)
     )
     folder = f"results/{wildcards.dataset}/{wildcards.recording}/{wildcards.axis}"
