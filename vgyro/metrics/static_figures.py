@@ -26,13 +26,11 @@ from vgyro.metrics.improvement import (
 from vgyro.metrics.readings import BAND_LIMITED_WORD, lowest_point
 from vgyro.metrics.sampling import Sampling
 from vgyro.metrics.spectrum import Spectrum
-from vgyro.metrics.static_series import Measured, RestRecording, without_means
+from vgyro.metrics.static_series import Measured, RestRecording
 
 POSE_NOTE = "each pose's own mean is removed"
 RESOLVED = 3  # blocks of the drawn series that the minimum of a curve must span
 BLOCKS_APART = 2.5  # times what is left out of the fit: blocks of 20 time constants are as good as independent
-
-__all__ = ["LowPass", "StaticFigures", "array_figures", "static_figures", "without_means"]
 
 
 @dataclass(frozen=True)
