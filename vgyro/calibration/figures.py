@@ -6,18 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from vgyro.figure import Figure
+
 VALUE = "value"
 BELOW = "below the floor"
 MISSING = "not measured"
-
-
-@dataclass(frozen=True)
-class Figure:
-    """title : for people;  unit : of value, low, high and floor;  meaning : definition and convention"""
-
-    title: str
-    unit: str
-    meaning: str
 
 
 @dataclass(frozen=True)

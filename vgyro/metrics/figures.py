@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True)
-class Figure:
-    """title : for people;  unit : of value, low and high;  meaning : definition and convention"""
-
-    title: str
-    unit: str
-    meaning: str
+from vgyro.figure import Figure
 
 
 @dataclass(frozen=True)

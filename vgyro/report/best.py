@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.report.model import ArrayPart, DatasetPart, Figure, Value
+from vgyro.figure import Figure
+from vgyro.report.model import ArrayPart, DatasetPart, Value
 from vgyro.report.moved import failing
 from vgyro.report.noise import method_labels
 from vgyro.report.numbers import plain, significant

@@ -9,9 +9,10 @@ from collections.abc import Mapping, Sequence
 
 from markupsafe import Markup
 
+from vgyro.figure import Figure
 from vgyro.report.certificate_plots import certificate_plots
 from vgyro.report.html import definitions, heading, join, macro, paragraph, print_button
-from vgyro.report.model import DatasetPart, Figure, Record
+from vgyro.report.model import DatasetPart, Record
 from vgyro.report.numbers import count, duration, percent, plain, significant
 from vgyro.report.tables import Cell, Column, Notes, Row, number_cell, render_table
 

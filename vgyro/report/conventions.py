@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 from markupsafe import Markup
 
+from vgyro.figure import Figure
 from vgyro.report.html import definitions, details, join, paragraph
-from vgyro.report.model import DatasetPart, Figure, Record
+from vgyro.report.model import DatasetPart, Record
 from vgyro.report.numbers import percent, plain
 from vgyro.report.tables import Cell, Column, render_table
 

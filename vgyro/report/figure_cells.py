@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from vgyro.report.model import Figure, Value
+from vgyro.figure import Figure
+from vgyro.report.model import Value
 from vgyro.report.numbers import MISSING, significant
 from vgyro.report.tables import Cell, Column, Notes, number_cell
 

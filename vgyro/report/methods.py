@@ -8,9 +8,10 @@ from typing import Any
 
 from markupsafe import Markup
 
+from vgyro.figure import Figure
 from vgyro.report.figure_cells import BAND_LIMITED, figure_cell, figure_column, says_limited
 from vgyro.report.html import join, paragraph
-from vgyro.report.model import ArrayPart, DatasetPart, Figure, Value, Values
+from vgyro.report.model import ArrayPart, DatasetPart, Value, Values
 from vgyro.report.numbers import MISSING, count, significant
 from vgyro.report.tables import Cell, Column, Notes, Row, render_table
 

@@ -12,20 +12,12 @@ import numpy as np
 
 from vgyro.board import Board
 from vgyro.dataset import Manifest
+from vgyro.figure import Figure
 
 Table = Mapping[str, np.ndarray]
 Record = Mapping[str, Any]
 # Recordings to which a rate is added for a second table (metrics.injected_rate).
 MOVED_KINDS = ("static", "thermal")
-
-
-@dataclass(frozen=True)
-class Figure:
-    """What a figure of metrics.parquet is called, its unit and what it means."""
-
-    title: str
-    unit: str
-    meaning: str
 
 
 @dataclass(frozen=True)

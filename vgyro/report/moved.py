@@ -7,9 +7,10 @@ from typing import Any
 
 from markupsafe import Markup
 
+from vgyro.figure import Figure
 from vgyro.report.figure_cells import figure_cell
 from vgyro.report.html import join, paragraph
-from vgyro.report.model import ArrayPart, DatasetPart, Figure, Value, Values
+from vgyro.report.model import ArrayPart, DatasetPart, Value, Values
 from vgyro.report.numbers import plain
 from vgyro.report.tables import Cell, Column, Notes, Row, render_table
 

@@ -12,7 +12,7 @@ from vgyro.config import DEFINITIONS
 from vgyro.dataset import Manifest
 from vgyro.metrics.figures import FIGURES
 from vgyro.report.dataset_page import headline, render_dataset
-from vgyro.report.model import ArrayPart, DatasetPart, Figure, RatesPart, Record, RecordingPart, Table
+from vgyro.report.model import ArrayPart, DatasetPart, RatesPart, Record, RecordingPart, Table
 from vgyro.storage.tables import read_columns, read_json, read_metadata, write_json, write_text
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.report_rates import read_rates
@@ -83,8 +83,8 @@ def read_dataset_part(task: Task) -> DatasetPart:
         recordings,
         read_json(task.input("calibration")),
         {path.stem: read_json(path) for path in task.inputs.get("noise", [])},
-        {key: Figure(figure.title, figure.unit, figure.meaning) for key, figure in FIGURES.items()},
-        {key: Figure(figure.title, figure.unit, figure.meaning) for key, figure in CALIBRATION_FIGURES.items()},
+        FIGURES,
+        CALIBRATION_FIGURES,
         task.options.get("analysis", {}),
         read_sources(task, placed),
     )
