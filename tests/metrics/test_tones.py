@@ -1,5 +1,6 @@
 """Lines of a spectrum: known sinusoids in simulated noise, noise without a line, and the real recordings."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -208,3 +209,11 @@ def test_adis_tones(shared_data: Path):
     (hump,) = find_tones(spectral_density(rate["z"], 100.0))
     assert 19 < hump.frequency < 20.5
     assert hump.resolution > 0.3
+
+
+def test_a_bend_of_a_well_known_spectrum_is_no_tone():
+    # A hump of a third, 0.2 Hz wide, known to 0.5 % by 50 000 averages: significant, but no line.
+    frequency = np.arange(1, 10_000) / 100
+    power = 1 / (1 + (frequency / 40) ** 2) * (1 + 0.33 * np.exp(-(((frequency - 20) / 0.1) ** 2)))
+    scatter = np.random.default_rng(5).standard_normal(frequency.size) / math.sqrt(50_000)
+    assert find_tones(Spectrum(frequency, np.sqrt(power * (1 + scatter)), 50_000)) == []
