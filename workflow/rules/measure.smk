@@ -47,7 +47,7 @@ rule crosscheck:
     benchmark:
         "results/benchmarks/{dataset}/{recording}/{axis}/crosscheck.tsv"
     resources:
-        mem_mb=1500,
+        mem_mb=2500,
         runtime=60,
     params:
         options=stage(
