@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vgyro.board import Board, Temperature, parse_board
-from vgyro.storage.tables import Provenance, TableWriter, write_table
-from vgyro.tasks.block_means import block_means, thermometer_of, whole_column
+from vgyro.storage.tables import Provenance, TableWriter, read_column, write_table
+from vgyro.tasks.block_means import block_means, thermometer_of
 
 NOWHERE = Provenance({}, "", "")
 
@@ -48,7 +48,7 @@ def test_means_do_not_depend_on_the_pieces(tmp_path: Path, piece: int) -> None:
     assert np.floor(means.time).astype(int).tolist() == list(by_hand)
     assert means.values["g1"] == pytest.approx(list(by_hand.values()))
     assert means.segment.tolist() == [0] * 5 + [1] * (len(by_hand) - 5)
-    np.testing.assert_array_equal(whole_column(tmp_path / "f.parquet", "g1"), table["g1"])
+    np.testing.assert_array_equal(read_column(tmp_path / "f.parquet", "g1"), table["g1"])
 
 
 def test_a_clipped_sample_hides_its_block(tmp_path: Path) -> None:

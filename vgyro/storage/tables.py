@@ -199,6 +199,20 @@ def read_batches(path: str | Path, columns: list[str]) -> Iterator[dict[str, np.
         yield {name: table.column(name).to_numpy() for name in columns}
 
 
+def read_column(path: Path, name: str, kind: type | None = None) -> np.ndarray:
+    """One column of numbers of a table [T], read piece by piece: little more memory than it takes itself.
+
+    kind : type of the numbers, None: as stored; as floats, missing ones are NaN
+    """
+    values = np.empty(pq.read_metadata(path).num_rows, kind or pq.read_schema(path).field(name).type.to_pandas_dtype())
+    first = 0
+    for batch in read_batches(path, [name]):
+        last = first + len(batch[name])
+        values[first:last] = batch[name]
+        first = last
+    return values
+
+
 class RowStream:
     """Rows of tables that follow each other, taken from the front in any number; holds little more than it gives."""
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 
 from vgyro.board import Board, Temperature
 from vgyro.storage.tables import read_batches
@@ -26,18 +25,6 @@ class BlockMeans:
     time: np.ndarray
     segment: np.ndarray
     values: dict[str, np.ndarray]
-
-
-def whole_column(frames: Path, name: str) -> np.ndarray:
-    """One column of numbers of a table, read row group by row group: little more memory than it takes itself."""
-    kind = pq.read_schema(frames).field(name).type.to_pandas_dtype()
-    values = np.empty(pq.read_metadata(frames).num_rows, dtype=kind)
-    first = 0
-    for batch in read_batches(frames, [name]):
-        stop = first + len(batch[name])
-        values[first:stop] = batch[name]
-        first = stop
-    return values
 
 
 def block_means(

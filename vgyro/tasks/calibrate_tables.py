@@ -23,7 +23,8 @@ from vgyro.calibration import (
 from vgyro.config import CalibrationOptions
 from vgyro.dataset import FileReference, PlateauReference, Recording
 from vgyro.errors import TooShort
-from vgyro.tasks.block_means import thermometer_of, whole_column
+from vgyro.storage.tables import read_column
+from vgyro.tasks.block_means import thermometer_of
 from vgyro.tasks.reference_log import read_reference
 
 
@@ -92,15 +93,15 @@ def read_means(source: Source, board: Board, array: list[Gyro], options: Calibra
     plateaus = list(plateaus_of(source, options))
     if not plateaus:
         raise TooShort("no plateau in the logged reference", source.recording.name)
-    time = whole_column(source.frames, "time")
+    time = read_column(source.frames, "time")
     rails = (board.adc.low, board.adc.high) if board.adc else None
     means = []
     for gyro in array:
         thermometer = thermometer_of(board, gyro.name)
         celsius = None
         if thermometer is not None:
-            celsius = whole_column(source.frames, thermometer.field) * thermometer.scale + thermometer.offset
-        column = whole_column(source.frames, gyro.field)[:, None]
+            celsius = read_column(source.frames, thermometer.field) * thermometer.scale + thermometer.offset
+        column = read_column(source.frames, gyro.field)[:, None]
         means.append(
             average_plateaus(
                 column, time, plateaus, rails, whole_turns=options.whole_turns, temperature=celsius

@@ -22,8 +22,8 @@ from vgyro.calibration import (
 )
 from vgyro.config import RestOptions
 from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, Recording, SinusoidReference
-from vgyro.storage.tables import TableWriter, read_batches, read_json
-from vgyro.tasks.block_means import block_means, whole_column
+from vgyro.storage.tables import TableWriter, read_batches, read_column, read_json
+from vgyro.tasks.block_means import block_means
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.reference_log import read_reference
 
@@ -42,7 +42,7 @@ def main(task: Task) -> None:
     board = Board.model_validate(task.options["board"])
     recording = manifest.recording(task.options["recording"])
     frames = task.input("frames")
-    time = whole_column(frames, "time")
+    time = read_column(frames, "time")
     rate_hz = sample_rate(recording, board, time)
     converter = Converter(board, recording, read_json(task.input("calibration"))["gyros"])
     converter.read_temperatures(frames, rate_hz)
@@ -150,7 +150,7 @@ class Converter:
         if self.board.adc is None or self.rates:
             return {}
         rails = (self.board.adc.low, self.board.adc.high)
-        return {gyro.name: clipped_samples(whole_column(frames, gyro.field), rails) for gyro in self.board.gyros}
+        return {gyro.name: clipped_samples(read_column(frames, gyro.field), rails) for gyro in self.board.gyros}
 
     def array(self, frames: Path, names: list[str]) -> np.ndarray:
         """Rates [T, n] of some gyros, in single precision."""
@@ -203,7 +203,7 @@ def rest_of(converter: Converter, frames: Path, time: np.ndarray, rate_hz: float
         return inside
     if recording.kind == "free" and time.size:
         rates = converter.array(frames, [gyro.name for gyro in converter.board.gyros])
-        return find_rest(rates, rate_hz, options, whole_column(frames, "segment"))
+        return find_rest(rates, rate_hz, options, read_column(frames, "segment"))
     return np.full(time.size, recording.kind in AT_REST)
 
 

@@ -13,12 +13,12 @@ from vgyro.engine.independent import printed_filter, textbook_allan_deviation
 from vgyro.fusion import FilterParameters
 from vgyro.fusion.design import information, q_for_bandwidth
 from vgyro.metrics import Sampling, allan_deviation, without_outliers
-from vgyro.storage.tables import read_columns, read_metadata, read_rows, write_table
+from vgyro.storage.tables import read_column, read_columns, read_metadata, read_rows, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.crosscheck_rows import Row, columns_of, compare
 from vgyro.tasks.crosscheck_windows import window_rows
 from vgyro.tasks.fusion_inputs import in_motion, read_noise
-from vgyro.tasks.rates_file import read_array, read_column
+from vgyro.tasks.rates_file import read_array
 
 FILTER_SAMPLES = 2000
 FILTER_TOLERANCE = 1e-9  # of the largest rate
@@ -84,7 +84,7 @@ def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterat
     sampling = file.rest_sampling(options.most_lost_s)
     rest, segment = file.at_rest, sampling.segment
     for name in rng.permutation(names)[:ALLAN_SERIES]:
-        rate = read_column(task.input("rates" if name in gyros else "fused"), str(name))
+        rate = read_column(task.input("rates" if name in gyros else "fused"), str(name), float)
         rate = rate if rest.all() else rate[rest]
         outliers = without_outliers(rate, file.rate_hz, segment, options.outlier_threshold)[1]
         whole = sampling.missing == 0 and not outliers.any()

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 from vgyro.errors import DataError
 from vgyro.metrics.sampling import Sampling
-from vgyro.storage.tables import read_batches, read_metadata
+from vgyro.storage.tables import read_batches, read_column, read_metadata
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class ArrayFile:
     @property
     def time(self) -> np.ndarray:
         """Time of each sample [T], s. Read from the file."""
-        return read_column(self.path, "time")
+        return read_column(self.path, "time", float)
 
     @property
     def reference(self) -> np.ndarray | None:
         """True rate about this axis [T], deg/s; None where it is not known. Read from the file."""
         known = "reference" in pq.read_schema(self.path).names
         about_axis = known and read_metadata(self.path).get("reference_axis", self.axis) == self.axis
-        return read_column(self.path, "reference") if about_axis else None
+        return read_column(self.path, "reference", float) if about_axis else None
 
     def sampling(self, most_lost_s: float) -> Sampling:
         """When all samples were taken; losses up to most_lost_s, s, do not end a stretch. Reads the times."""
@@ -81,17 +81,6 @@ def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
     return ArrayFile(rate.T, segment, at_rest, float(metadata["rate_hz"]), path, axis)
 
 
-def read_column(path: Path, name: str) -> np.ndarray:
-    """One column of numbers of any table [T], read in pieces; missing values are NaN."""
-    values = np.empty(pq.read_metadata(path).num_rows)
-    first = 0
-    for batch in read_batches(path, [name]):
-        last = first + len(batch[name])
-        values[first:last] = batch[name]
-        first = last
-    return values
-
-
 @dataclass(frozen=True)
 class FileColumns(Sequence[np.ndarray]):
     """Columns of numbers of tables, each read when it is asked for.
@@ -115,7 +104,7 @@ class FileColumns(Sequence[np.ndarray]):
     def __getitem__(self, index: int | slice) -> np.ndarray | FileColumns:
         if isinstance(index, slice):
             return replace(self, places=self.places[index])
-        values = read_column(*self.places[index])
+        values = read_column(*self.places[index], float)
         if self.where is not None and not self.where.all():
             values = values[self.where]
         if np.any(self.less):
