@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
@@ -14,11 +14,14 @@ Mode = Literal["in_sample", "causal"]
 CorrelationModel = Literal["dcc", "ccc"]
 Engine = Literal["native", "reference"]
 Curve = Literal["modified", "hadamard", "robust"]
+MotionModel = Literal["random_walk", "acceleration", "jerk", "oscillator", "markov"]
+Switch = Literal["auto", "off"]
 
 PARTIAL = "partial"
 
 DEFINITIONS: tuple[Definition, ...] = ("level", "demeaned", "difference", "residual")
 MODES: tuple[Mode, ...] = ("in_sample", "causal")
+MOTION_MODELS: tuple[MotionModel, ...] = ("random_walk", "acceleration", "jerk", "oscillator", "markov")
 MODELS: tuple[CorrelationModel, ...] = ("dcc", "ccc")
 
 
@@ -92,6 +95,28 @@ class FusionOptions(StrictModel):
     tau_s: float = Field(500.0, gt=0, description="time constant of the first-order Markov rate model, s")
     moment_window_s: float = Field(360.0, gt=0, description="window of the rolling second-moment weights, s")
     ewma_time_s: float = Field(60.0, gt=0, description="time constant of the exponentially weighted moments, s")
+    motion_models: tuple[MotionModel, ...] = Field(
+        MOTION_MODELS, min_length=1, description="models of the rate from which the smoother chooses by likelihood"
+    )
+    anchors: Switch = Field("auto", description="auto: pin the bias where the board stands still between motion; off")
+    temperature: Switch = Field("auto", description="auto: regress the bias on the logged temperature; off: never")
+    scale_sd: float = Field(0.01, gt=0, lt=1, description="s.d. of the scale factors' errors, for stubberud_2008")
+    bank_correlations: tuple[Annotated[float, Field(gt=-1, lt=1)], ...] = Field(
+        (0.0, 0.25, 0.5), min_length=1, description="correlations of the filters of al_majed"
+    )
+    bank_bandwidths: tuple[Annotated[float, Field(gt=0)], ...] = Field(
+        (0.2, 1.0, 5.0), min_length=1, description="their bandwidths, as multiples of bandwidth_hz"
+    )
+    most_gyros: int = Field(48, ge=2, le=1000, description="largest array of the analysis of more gyros")
+
+
+class FaultOptions(StrictModel):
+    """How faults of single gyros are found."""
+
+    detect: Switch = Field("auto", description="auto: find faults, and leave the gyro out while they last; off")
+    block_s: float = Field(1.0, gt=0, description="length of the means in which faults are looked for, s")
+    threshold: float = Field(7.0, ge=4, description="least evidence of a fault, standard deviations")
+    burst_s: float = Field(30.0, gt=0, description="more noise for a shorter time is a burst, s")
 
 
 class MetricsOptions(StrictModel):
@@ -133,6 +158,7 @@ class Analysis(StrictModel):
     rest: RestOptions = RestOptions()
     calibration: CalibrationOptions = CalibrationOptions()
     volatility: VolatilityOptions = VolatilityOptions()
+    faults: FaultOptions = FaultOptions()
     fusion: FusionOptions = FusionOptions()
     metrics: MetricsOptions = MetricsOptions()
     crosscheck: CrossCheckOptions = CrossCheckOptions()

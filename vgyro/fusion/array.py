@@ -6,13 +6,17 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
-from vgyro.config import FusionOptions
+from vgyro.config import MOTION_MODELS, FusionOptions, MotionModel, Switch
 from vgyro.errors import DataError
 from vgyro.fusion.blocks import SampleWeights
+from vgyro.fusion.events import FaultEvent
 from vgyro.units import arw_deg_s_rt_hz
+
+Family = Literal["baseline", "paper", "ours"]
 
 WeightKey = tuple[str, str, str]
 """model (dcc, ccc), mode (in_sample, causal), definition of r_t"""
@@ -55,6 +59,9 @@ class ArrayRates:
     segment : array [T], number of the gap-free stretch;  at_rest : array [T] of bool
     weights : (model, mode, definition) → weights of the samples
     no_weights : the same keys → why there are none
+    faults     : stretches in which one gyro is at fault
+    temperature : [T] °C, of the board; None: not logged
+    stretch_time : [S] s, time of the first sample of each gap-free stretch; None: they follow without time between
     """
 
     rate: np.ndarray
@@ -64,6 +71,9 @@ class ArrayRates:
     noise: ArrayNoise
     weights: Mapping[WeightKey, SampleWeights] = field(default_factory=dict)
     no_weights: Mapping[WeightKey, str] = field(default_factory=dict)
+    faults: tuple[FaultEvent, ...] = ()
+    temperature: np.ndarray | None = None
+    stretch_time: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         samples = len(self.rate)
@@ -82,7 +92,23 @@ class ArrayRates:
         """Some of the samples, first to last - 1."""
         weights = {key: one.part(samples) for key, one in self.weights.items()}
         columns = {name: getattr(self, name)[samples] for name in ("rate", "segment", "at_rest")}
-        return replace(self, **columns, weights=weights)
+        first, last, _ = samples.indices(len(self.rate))
+        faults = tuple(one.within(first, last) for one in self.faults if one.start < last and one.stop > first)
+        temperature = None if self.temperature is None else self.temperature[samples]
+        stretch_time = None if self.stretch_time is None else self._stretch_times(first, last)
+        return replace(
+            self, **columns, weights=weights, faults=faults, temperature=temperature, stretch_time=stretch_time
+        )
+
+    def _stretch_times(self, first: int, last: int) -> np.ndarray:
+        """Times of the first samples of the stretches that samples [first, last) lie in, from sample `first` on."""
+        assert self.stretch_time is not None
+        parts = zip(self.stretches(), self.stretch_time.tolist(), strict=True)
+        return np.array([
+            time + (max(part.start, first) - part.start) * self.period
+            for part, time in parts
+            if part.start < last and part.stop > first
+        ])  # fmt: skip
 
     def stretches(self) -> list[slice]:
         """The gap-free stretches, in order."""
@@ -101,6 +127,11 @@ class FilterParameters:
     tau_s           : time constant of the first-order Markov rate, s
     block_hz        : rate of the block means whose second moments make weights, Hz
     moment_window_s, ewma_time_s : memory of these moments, s
+    motion_models   : models of the rate from which the smoother chooses
+    anchors, temperature : "auto" or "off": pin the bias where the board is known to stand still; regress it on the
+                      temperature
+    scale_sd        : standard deviation of the gyros' scale factor errors, for the filter that estimates them
+    bank_correlations, bank_bandwidths : of the filters of the adaptive bank; bandwidths as multiples of bandwidth_hz
     in_motion       : the board moves in this recording, at least in part
     engine          : who runs the recursions
     definition      : definition of r_t, for the methods that have one each
@@ -113,6 +144,12 @@ class FilterParameters:
     block_hz: float = 1.0
     moment_window_s: float = 360.0
     ewma_time_s: float = 60.0
+    motion_models: tuple[MotionModel, ...] = MOTION_MODELS
+    anchors: Switch = "auto"
+    temperature: Switch = "auto"
+    scale_sd: float = 0.01
+    bank_correlations: tuple[float, ...] = (0.0, 0.25, 0.5)
+    bank_bandwidths: tuple[float, ...] = (0.2, 1.0, 5.0)
     in_motion: bool = False
     engine: str = "native"
     definition: str = ""
@@ -131,6 +168,12 @@ class FilterParameters:
             block_hz=block_hz,
             moment_window_s=options.moment_window_s,
             ewma_time_s=options.ewma_time_s,
+            motion_models=options.motion_models,
+            anchors=options.anchors,
+            temperature=options.temperature,
+            scale_sd=options.scale_sd,
+            bank_correlations=options.bank_correlations,
+            bank_bandwidths=options.bank_bandwidths,
             in_motion=in_motion,
             engine=engine,
         )
@@ -147,6 +190,9 @@ class Fused:
     noise_bandwidth_hz : noise-equivalent bandwidth, one-sided, Hz; NaN: not limited
     delay_s            : delay at low frequency, s
     note               : what to know before using it
+    passes             : how often a first-order low-pass of this bandwidth is run over it: 1, forward; 2, forward and
+                         back, without delay; 0: it has another shape, or no limit of bandwidth
+    sd                 : array [T], deg/s, posterior standard deviation of each sample; None: the method has none
     """
 
     rate: np.ndarray
@@ -156,6 +202,8 @@ class Fused:
     noise_bandwidth_hz: float = math.nan
     delay_s: float = math.nan
     note: str = ""
+    passes: int = 1
+    sd: np.ndarray | None = None
 
     @classmethod
     def undelayed(cls, rate: np.ndarray, weights: np.ndarray | SampleWeights | None = None, note: str = "") -> Fused:
@@ -163,16 +211,24 @@ class Fused:
         return cls(rate, weights, dc_gain=1.0, delay_s=0.0, note=note)
 
 
+def _not_counted(gyros: int) -> float:  # noqa: ARG001
+    return math.nan
+
+
 @dataclass(frozen=True)
 class Method:
     """One way to make one rate of many: an entry of vgyro.fusion.METHODS.
 
     causal : sample t uses nothing later than t; noise coefficients count as known beforehand
-    needs  : what it takes beside the rates: "arw", "rrw" (of every gyro), "weights" (of vgyro.volatility)
+    needs  : what it takes beside the rates: "arw", "rrw" (of every gyro), "correlation", "weights" (of
+             vgyro.volatility), "faults" (of vgyro.fusion.faults)
     fuse   : (ArrayRates, FilterParameters) → Fused;  raises CannotRun, with the reason
     per_definition : it runs once for each definition of r_t
     same_at_any_rate : definition ("" of a method without) → why a constant rate, added to all gyros, adds itself to the
                        fused rate and changes nothing else. What is not in it is run again with such a rate
+    family     : baseline, of a paper, or ours
+    operations : N gyros → floating-point operations a sample, all passes; what is done once a recording is left out
+    inferred   : what its paper does not say, or could not be read, and how it was filled in
     """
 
     name: str
@@ -183,3 +239,6 @@ class Method:
     fuse: Callable[[ArrayRates, FilterParameters], Fused]
     per_definition: bool = False
     same_at_any_rate: Mapping[str, str] = field(default_factory=dict)
+    family: Family = "paper"
+    operations: Callable[[int], float] = _not_counted
+    inferred: str = ""
