@@ -52,7 +52,7 @@ FIGURES: dict[str, Figure] = {
         "Error 1σ, delay and gain removed", "deg/s", "standard deviation about offset + gain · delayed reference"
     ),
     "nees": Figure(
-        "NEES", "1", "mean of (error / posterior s.d.)²: 1 where the stated s.d. is honest, above 1 where it is too small"
+        "NEES", "1", "mean of (error / posterior s.d.)²: 1 where that s.d. is honest, above 1 where it is too small"
     ),
     "amplitude": Figure(
         "Amplitude", "deg/s", "gain times √2 times the r.m.s. of the reference: a sinusoid's amplitude"
