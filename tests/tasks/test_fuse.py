@@ -339,3 +339,26 @@ def test_crosscheck_without_weights_or_gyros_to_fuse(tmp_path):
     inputs |= {"noise": ["noise.json"], "garch": [], "dcc": [], "weights": []}
     crosscheck.main(task_of(tmp_path, inputs, {"crosscheck": "crosscheck.parquet"}, gyros=("g1",)))
     assert len(read_columns(tmp_path / "crosscheck.parquet")["check"]) == 0
+
+
+def test_what_a_method_is_and_its_deviation_reach_the_tables(analysed, monkeypatch):
+    # Known: what the method itself says.
+    sd = np.linspace(0.01, 0.02, int(SECONDS * RATE_HZ))
+
+    def known(array, parameters):  # noqa: ARG001
+        return Fused(array.rate.mean(axis=1), dc_gain=1.0, bandwidth_hz=2.0, delay_s=0.0, passes=2, sd=sd)
+
+    method = Method(
+        "known", "Known", "test", False, ("arw", "rrw"), known, family="ours", operations=lambda n: 7.0 * n,
+        inferred="nothing",
+    )  # fmt: skip
+    monkeypatch.setitem(METHODS, "known", method)
+    fused, methods = fuse_in(analysed)
+    row = list(methods["method"]).index("known")
+    names = ("family", "needs", "inferred", "operations", "passes")
+    assert [methods[name][row] for name in names] == ["ours", "arw, rrw", "nothing", 21.0, 2]
+    assert fused["sd_known"].dtype == np.float32
+    np.testing.assert_allclose(fused["sd_known"], sd, rtol=1e-6)
+    np.testing.assert_allclose(fused["known"], fused["average"], atol=1e-12)
+    assert [name for name in fused if name.startswith("sd_")] == ["sd_known"]
+    assert read_metadata(analysed / "fused.parquet")["units"]["sd_known"] == "deg/s"

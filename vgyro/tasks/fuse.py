@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import isfinite
+from os import SEEK_END
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, BinaryIO
@@ -21,8 +22,9 @@ from vgyro.storage.tables import ROW_GROUP, TableWriter, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.fusion_inputs import OpenArray, open_array
 
-TEXTS = ("method", "definition", "column", "title", "source")
+TEXTS = ("method", "definition", "column", "title", "source", "family", "needs", "inferred")
 FIGURES = ("dc_gain", "bandwidth_hz", "noise_bandwidth_hz", "delay_s")
+SD = "sd_{}"
 Row = dict[str, Any]
 ONE_GYRO = "one gyro: there is nothing to fuse"
 
@@ -64,21 +66,21 @@ class Columns:
     """Fused rates, kept in a file until all of them are there: they do not fit into memory together."""
 
     def __init__(self, file: BinaryIO) -> None:
-        self._file, self._names = file, list[str]()
+        self._file, self._places = file, dict[str, tuple[int, np.dtype]]()
 
     def add(self, name: str, values: np.ndarray) -> None:
-        """Take a column [T] of float64."""
+        """Take a column [T]."""
+        self._places[name] = self._file.seek(0, SEEK_END), values.dtype
         values.tofile(self._file)
-        self._names.append(name)
 
     def pieces(self, time: np.ndarray, segment: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """The table, a row group at a time."""
         for start in range(0, len(time), ROW_GROUP):
             rows = slice(start, min(start + ROW_GROUP, len(time)))
             columns = {"time": time[rows], "segment": segment[rows]}
-            for place, name in enumerate(self._names):
-                self._file.seek((place * len(time) + start) * np.dtype(float).itemsize)
-                columns[name] = np.fromfile(self._file, count=rows.stop - start)
+            for name, (place, dtype) in self._places.items():
+                self._file.seek(place + start * dtype.itemsize)
+                columns[name] = np.fromfile(self._file, dtype, rows.stop - start)
             yield columns
 
 
@@ -104,6 +106,8 @@ def run_all(opened: OpenArray, fused: Columns) -> list[Row]:
         logging.info("%s: %s", outcome.column or outcome.method.name, outcome.note or "ok")
         if outcome.fused is not None:
             fused.add(outcome.column, outcome.fused.rate)
+            if outcome.fused.sd is not None:
+                fused.add(SD.format(outcome.column), outcome.fused.sd.astype(np.float32, copy=False))
         return describe(outcome, opened)
 
     methods = select(opened.fusion.methods)
@@ -147,9 +151,13 @@ def keep_error(added: float, moved: Columns, outcome: Outcome) -> tuple[tuple[st
 def describe(outcome: Outcome, opened: OpenArray) -> Row:
     """A row of methods.parquet but for `moved`; figures are NaN where the method could not run."""
     method, fused = outcome.method, outcome.fused
-    texts = (method.name, outcome.definition, outcome.column, method.title, method.source)
-    figures, how = dict.fromkeys(FIGURES, float("nan")), ""
+    texts = (
+        method.name, outcome.definition, outcome.column, method.title, method.source, method.family,
+        ", ".join(method.needs), method.inferred,
+    )  # fmt: skip
+    figures, how, passes = dict.fromkeys(FIGURES, float("nan")), "", 0
     if fused is not None:
+        passes = fused.passes
         known = isfinite(fused.dc_gain)
         source = (
             fused
@@ -157,14 +165,15 @@ def describe(outcome: Outcome, opened: OpenArray) -> Row:
             else measured_response(method.fuse, opened.rates, replace(opened.parameters, definition=outcome.definition))
         )
         figures, how = {name: getattr(source, name) for name in FIGURES}, "analytic" if known else "measured"
-    row = {**dict(zip(TEXTS, texts, strict=True)), "causal": method.causal, **figures}
-    return {**row, "response": how, "note": outcome.note}
+    operations = float(method.operations(len(opened.gyros)))
+    row = {**dict(zip(TEXTS, texts, strict=True)), "operations": operations, "causal": method.causal, **figures}
+    return {**row, "passes": passes, "response": how, "note": outcome.note}
 
 
 def table_of(rows: list[Row]) -> pa.Table:
     """Rows → table; without rows, too, the columns have their types."""
-    fields = [(name, pa.string()) for name in TEXTS] + [("causal", pa.bool_())]
-    fields += [(name, pa.float64()) for name in FIGURES]
+    fields = [(name, pa.string()) for name in TEXTS] + [("operations", pa.float64()), ("causal", pa.bool_())]
+    fields += [*((name, pa.float64()) for name in FIGURES), ("passes", pa.int64())]
     fields += [(name, pa.string()) for name in ("response", "moved", "note")]
     return pa.Table.from_pylist(rows, schema=pa.schema(fields))
 
