@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.events import FaultEvent
 from vgyro.units import arw_deg_s_rt_hz
 
+T = TypeVar("T")
 Family = Literal["baseline", "paper", "ours"]
 
 WeightKey = tuple[str, str, str]
@@ -59,6 +60,8 @@ class ArrayRates:
     segment : array [T], number of the gap-free stretch;  at_rest : array [T] of bool
     weights : (model, mode, definition) → weights of the samples
     no_weights : the same keys → why there are none
+    deviations : (model, mode, definition) → conditional standard deviations of the gyros in deg/s, of the block means
+                 that the weights were made from; NaN where there is no fit
     faults     : stretches in which one gyro is at fault
     temperature : [T] °C, of the board; None: not logged
     stretch_time : [S] s, time of the first sample of each gap-free stretch; None: they follow without time between
@@ -71,9 +74,11 @@ class ArrayRates:
     noise: ArrayNoise
     weights: Mapping[WeightKey, SampleWeights] = field(default_factory=dict)
     no_weights: Mapping[WeightKey, str] = field(default_factory=dict)
+    deviations: Mapping[WeightKey, SampleWeights] = field(default_factory=dict)
     faults: tuple[FaultEvent, ...] = ()
     temperature: np.ndarray | None = None
     stretch_time: np.ndarray | None = None
+    _made: dict[Hashable, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         samples = len(self.rate)
@@ -88,17 +93,25 @@ class ArrayRates:
         """Sample period T, s."""
         return 1.0 / self.rate_hz
 
+    def once(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What `make` returns, made once: for results that several methods need. A copy with other rates has none."""
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
+
     def part(self, samples: slice) -> ArrayRates:
         """Some of the samples, first to last - 1."""
         weights = {key: one.part(samples) for key, one in self.weights.items()}
+        deviations = {key: one.part(samples) for key, one in self.deviations.items()}
         columns = {name: getattr(self, name)[samples] for name in ("rate", "segment", "at_rest")}
         first, last, _ = samples.indices(len(self.rate))
         faults = tuple(one.within(first, last) for one in self.faults if one.start < last and one.stop > first)
         temperature = None if self.temperature is None else self.temperature[samples]
         stretch_time = None if self.stretch_time is None else self._stretch_times(first, last)
         return replace(
-            self, **columns, weights=weights, faults=faults, temperature=temperature, stretch_time=stretch_time
-        )
+            self, **columns, weights=weights, deviations=deviations, faults=faults, temperature=temperature,
+            stretch_time=stretch_time,
+        )  # fmt: skip
 
     def _stretch_times(self, first: int, last: int) -> np.ndarray:
         """Times of the first samples of the stretches that samples [first, last) lie in, from sample `first` on."""
