@@ -18,7 +18,7 @@ from vgyro.simulate import (
 )
 from vgyro.validation import InvalidFile
 
-SHIPPED = ("calibration", "demo", "jiang2012", "liu2015")
+SHIPPED = ("calibration", "demo", "faulty", "jiang2012", "liu2015")
 HEAD = "name: t\nboard: dsp6\nseed: 1\n"
 # As printed in Liu et al. (2015), Table 3: mean deg/s, 1σ deg/s, ARW deg/√h, bias drift deg/h.
 LIU = {
