@@ -5,6 +5,7 @@ dcc     : DCC(1,1) with two-step standard errors, and the test of constant corre
 weights : constrained minimum-variance weights by an active set, and the path of the conditional covariance
 allan   : overlapping Allan deviation
 kalman  : filters and smoother of a scalar rate
+statespace : likelihood and smoother of a state space that one series measures
 frames  : frames of a serial dump: synchronisation and checksums
 
 Each is a module, loaded at first use: `vgyro.engine.get("native").garch.fit_garch(...)`. The kernels are compiled
@@ -23,7 +24,7 @@ from vgyro.errors import EngineError
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
-    from vgyro.engine.native import allan, dcc, frames, garch, kalman, weights  # noqa: F401
+    from vgyro.engine.native import allan, dcc, frames, garch, kalman, statespace, weights  # noqa: F401
 
     # Compiled: they have no Python source to read types from.
     _allan: Any
@@ -32,9 +33,10 @@ if TYPE_CHECKING:
     _frames: Any
     _garch: Any
     _kalman: Any
+    _statespace: Any
     _weights: Any
 
-MODULES = ("garch", "dcc", "weights", "allan", "kalman", "frames")
+MODULES = ("garch", "dcc", "weights", "allan", "kalman", "statespace", "frames")
 
 
 def __getattr__(name: str) -> ModuleType:
