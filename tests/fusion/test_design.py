@@ -16,7 +16,7 @@ Q = 0.0772
 
 
 def test_static_design_of_jiang():
-    # Expected: closed form of docs/methods.md, N = 6.17 °/√h, q = 0.0772 deg²/s³ (Jiang et al. 2012, section 3.3).
+    # Expected: closed form of docs/fusion.md, N = 6.17 °/√h, q = 0.0772 deg²/s³ (Jiang et al. 2012, section 3.3).
     assert pytest.approx(567.4, abs=0.05) == D
     assert design.pole(D, Q) == pytest.approx(6.618, abs=5e-4)
     assert design.bandwidth(D, Q) == pytest.approx(1.053, abs=5e-4)
@@ -53,12 +53,12 @@ def test_markov_tends_to_the_random_walk():
     assert design.steady_variance(D, Q, 1e9) == pytest.approx(design.steady_variance(D, Q), rel=1e-9)
     assert design.steady_variance(D, Q) == pytest.approx(math.sqrt(Q / D), rel=1e-14)
     assert design.dc_gain(D, Q, 1e12) == pytest.approx(1.0, abs=1e-12)
-    # With τ = 500 s the two bandwidths differ by 5e-8 of themselves (docs/methods.md).
+    # With τ = 500 s the two bandwidths differ by 5e-8 of themselves (docs/fusion.md).
     assert design.bandwidth(D, Q, 500.0) / design.bandwidth(D, Q) - 1 == pytest.approx(5e-8, rel=0.1)
 
 
 def test_dc_gain():
-    # Expected: 1 - 1/(τs), and the 0.71 of docs/methods.md at τ = 0.5 s.
+    # Expected: 1 - 1/(τs), and the 0.71 of docs/fusion.md at τ = 0.5 s.
     s = design.pole(D, Q, 0.5)
     assert design.dc_gain(D, Q, 0.5) == pytest.approx(1 - 1 / (0.5 * s), rel=1e-12)
     assert design.dc_gain(D, Q, 0.5) == pytest.approx(0.71, abs=0.005)

@@ -126,7 +126,7 @@ def test_noise_bandwidth(make_array):
 
 
 def test_jiang_table_3_sinusoid(make_array):
-    # Expected: docs/methods.md for 62.8·sin(1.57 t) at 500 Hz, q = 1.929, both models: amplitude 62.73, raw 1σ 2.04,
+    # Expected: docs/fusion.md for 62.8·sin(1.57 t) at 500 Hz, q = 1.929, both models: amplitude 62.73, raw 1σ 2.04,
     # 1σ with the lag of 29 ms removed 0.174 (constant 1σ 0.167).
     time = np.arange(60 * 500) / 500.0
     truth = 62.8 * np.sin(1.57 * time)
@@ -144,7 +144,7 @@ def test_jiang_table_3_sinusoid(make_array):
 
 
 def test_allan_deviation_at_one_second(make_array):
-    # Expected: ADEV(1 s) of the filter over that of the average is 0.880 (docs/methods.md); 30 min leave it some 2 %.
+    # Expected: ADEV(1 s) of the filter over that of the average is 0.880 (docs/fusion.md); 30 min leave it some 2 %.
     array = make_array(30 * 60 * 50, np.full(6, ARW), rate_hz=50.0, seed=3)
     filtered, mean = METHODS["jiang_random_walk"].fuse(array, STATIC).rate, array.rate.mean(axis=1)
     settled = slice(200, None)
