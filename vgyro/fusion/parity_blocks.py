@@ -1,0 +1,154 @@
+"""Second moments of the differences between the gyros, in fine blocks: all that the parity variances need of the samples.
+
+A residual y - 1·u'y with weights u that are constant within a block has the second moment A·S·A', A = I - 1u', whatever
+u is: so the samples are read once, and every iteration runs over blocks. The motion cancels in S.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.fusion.array import ArrayRates
+from vgyro.fusion.blocks import PIECE
+from vgyro.fusion.events import excluded
+
+BLOCK_S = 0.25
+FEWEST_SAMPLES = 16
+"""A finer block says little of its own variance."""
+SINGLE_BELOW_HZ = 8.0
+"""Below this rate every sample is a block."""
+SLOW_BLOCKS = 32
+"""The slow part of a residual is its mean over so many blocks on either side of its own."""
+STUCK_SAMPLES = 16
+"""A gyro that repeats one value so often is stuck."""
+
+
+@dataclass(frozen=True)
+class BlockMoments:
+    """M blocks of the samples; they never reach over a gap, and every sample is in one.
+
+    start, stop [M] int64 : their samples
+    low, high [M]         : first and last block of the window about each that its slow part is the mean over
+    square [M, N, N]      : Σ dd' over the samples, (deg/s)², d = y - mean over the gyros
+    mean [M, N]           : mean of d, deg/s
+    excluded [M, N]       : at fault, or stuck
+    """
+
+    start: np.ndarray
+    stop: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    square: np.ndarray
+    mean: np.ndarray
+    excluded: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """Samples of each block [M]."""
+        return self.stop - self.start
+
+    def window_sum(self, values: np.ndarray) -> np.ndarray:
+        """Sums of values [M, ...] over the window about each block."""
+        total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+        return total[self.high + 1] - total[self.low]
+
+    def residual(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean squares, (deg/s)², and means, deg/s, [M, N] of y - 1·u'y in each block, for u [M, N] with Σu = 1."""
+        cross = np.matmul(self.square, weights[:, :, None])[:, :, 0]
+        own = np.einsum("bii->bi", self.square)
+        total = own - 2.0 * cross + np.sum(cross * weights, axis=1, keepdims=True)
+        mean = self.mean - np.sum(self.mean * weights, axis=1, keepdims=True)
+        return np.maximum(total, 0.0) / self.size[:, None], mean
+
+
+def block_moments(array: ArrayRates) -> BlockMoments:
+    """Blocks of about 0.25 s, 16 samples at least; of single samples where the rate is below 8 Hz."""
+    start, stop, low, high = _edges(array)
+    gyros = array.rate.shape[1]
+    square = np.empty((len(start), gyros, gyros))
+    mean = np.empty((len(start), gyros))
+    still = np.empty((len(start), gyros), dtype=bool)
+    first_of_stretch = np.array([part.start for part in array.stretches()])
+    for blocks in _pieces(start, stop):
+        rows = slice(int(start[blocks.start]), int(stop[blocks.stop - 1]))
+        begin = start[blocks] - rows.start
+        values = np.array(array.rate[rows].T, dtype=float, order="C")
+        still[blocks] = _unchanged(values, array.rate[rows.start - 1] if rows.start else None, begin)
+        values -= values.mean(axis=0)
+        mean[blocks] = (_sums(values, begin) / (stop[blocks] - start[blocks])).T
+        for one in range(gyros):
+            for other in range(one + 1):
+                square[blocks, one, other] = square[blocks, other, one] = _sums(values[one] * values[other], begin)
+    # The first sample of a stretch repeats nothing.
+    still[(stop - start == 1) & np.isin(start, first_of_stretch)] = False
+    bad = _stuck(still, start, stop)
+    _mark(bad, start, stop, excluded(array.faults, len(array.rate), gyros))
+    return BlockMoments(start, stop, low, high, square, mean, bad)
+
+
+def block_size(rate_hz: float) -> int:
+    """Samples of a block."""
+    return 1 if rate_hz < SINGLE_BELOW_HZ else max(FEWEST_SAMPLES, round(BLOCK_S * rate_hz))
+
+
+def _edges(array: ArrayRates) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """start, stop, low, high of the blocks; what is left over in a stretch is of its last block."""
+    size = block_size(array.rate_hz)
+    starts, stops, lows, highs, number = [], [], [], [], 0
+    for part in array.stretches():
+        count = max(1, (part.stop - part.start) // size)
+        begin = part.start + size * np.arange(count, dtype=np.int64)
+        place = number + np.arange(count)
+        starts.append(begin)
+        stops.append(np.append(begin[1:], part.stop))
+        lows.append(np.maximum(place - SLOW_BLOCKS, number))
+        highs.append(np.minimum(place + SLOW_BLOCKS, number + count - 1))
+        number += count
+    start, stop, low, high = (np.concatenate(one) for one in (starts, stops, lows, highs))
+    return start, stop, low, high
+
+
+def _pieces(start: np.ndarray, stop: np.ndarray) -> Iterator[slice]:
+    """Slices of blocks with about PIECE samples each."""
+    first = 0
+    while first < len(start):
+        last = max(first + 1, int(np.searchsorted(stop, start[first] + PIECE, side="right")))
+        yield slice(first, last)
+        first = last
+
+
+def _sums(values: np.ndarray, begin: np.ndarray) -> np.ndarray:
+    """Sums [..., B] of values [..., n] over blocks that begin at samples `begin`."""
+    return values if len(begin) == values.shape[-1] else np.add.reduceat(values, begin, axis=-1)
+
+
+def _unchanged(values: np.ndarray, before: np.ndarray | None, begin: np.ndarray) -> np.ndarray:
+    """[B, N]: every sample of the block repeats the one before it; of values [N, n] after the sample `before`."""
+    change = np.empty(values.shape, dtype=np.int32)
+    change[:, 1:] = values[:, 1:] != values[:, :-1]
+    change[:, 0] = 0 if before is None else values[:, 0] != before
+    # In a block of several samples the first may be the one that is then repeated.
+    change[:, begin[np.diff(begin, append=values.shape[1]) > 1]] = 0
+    return (_sums(change, begin) == 0).T
+
+
+def _stuck(still: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+    """[M, N]: blocks in runs of unchanged ones with STUCK_SAMPLES or more samples."""
+    stuck = np.zeros_like(still)
+    for gyro, column in enumerate(still.T):
+        if not column.any():
+            continue
+        edge = np.flatnonzero(np.diff(np.concatenate([[0], column.astype(np.int8), [0]])))
+        for first, last in edge.reshape(-1, 2):
+            stuck[first:last, gyro] = stop[last - 1] - start[first] >= STUCK_SAMPLES
+    return stuck
+
+
+def _mark(bad: np.ndarray, start: np.ndarray, stop: np.ndarray, stretches: list[np.ndarray]) -> None:
+    """Mark the blocks that a stretch of a fault touches, in place."""
+    for gyro, spans in enumerate(stretches):
+        for first, last in spans:
+            bad[np.searchsorted(stop, first, side="right") : np.searchsorted(start, last, side="left"), gyro] = True

@@ -1,0 +1,104 @@
+"""How fast a variance changes: time constants, change points, and which of them predicts best."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.fusion.parity_segments import change_points, segment_sums
+
+TIME_CONSTANTS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0)
+FEWEST_BLOCKS = 2.0
+"""A shorter time constant, in blocks, is no average."""
+LEAST_MASS = 1e-9
+
+LowPass = Callable[[np.ndarray, float, float, float], np.ndarray]
+"""signal, keep, gain, start → keep·y_{k-1} + gain·signal_k"""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a variance is an average over.
+
+    points : [C] change points, within whose segments the average is taken, or relative to whose means
+    keep   : share of a block that is left one block further; 1: every block counts the same
+    tau_s  : the same as a time constant; infinite: constant but for the change points
+    """
+
+    points: np.ndarray
+    keep: float
+    tau_s: float
+
+    def average(self, square: np.ndarray, freedom: np.ndarray, low_pass: LowPass) -> tuple[np.ndarray, np.ndarray]:
+        """Variance [M] of each block with the block itself, and without it, from its square [M] and freedom [M].
+
+        Two-sided EWMA with weights freedom·keep^|distance|. Where nothing is known: the mean over all.
+        """
+        total = freedom * square
+        level = total.sum() / max(freedom.sum(), LEAST_MASS)
+        if len(self.points) or self.keep == 1.0:
+            number, mass = segment_sums(self.points, freedom), segment_sums(self.points, total)
+            base, alone = _ratio(mass, number, level), _ratio(mass - total, number - freedom, level)
+            if self.keep == 1.0:
+                return base, alone
+            relative = Memory(np.empty(0, dtype=np.int64), self.keep, self.tau_s)
+            with_it, without = relative.average(square / base, freedom, low_pass)
+            return base * with_it, alone * without
+        around, near = _both_sides(total, self.keep, low_pass), _both_sides(freedom, self.keep, low_pass)
+        return _ratio(around, near, level), _ratio(around - total, near - freedom, level)
+
+
+def _both_sides(values: np.ndarray, keep: float, low_pass: LowPass) -> np.ndarray:
+    ahead = low_pass(np.ascontiguousarray(values[::-1]), keep, 1.0, 0.0)[::-1]
+    return low_pass(values, keep, 1.0, 0.0) + ahead - values
+
+
+def _ratio(total: np.ndarray, number: np.ndarray, level: float) -> np.ndarray:
+    known = number > LEAST_MASS
+    return np.where(known, np.maximum(total, LEAST_MASS * level) / np.where(known, number, 1.0), level)
+
+
+def chosen_memory(square: np.ndarray, freedom: np.ndarray, block_s: float, low_pass: LowPass) -> Memory:
+    """The memory that predicts each block best from the others.
+
+    square [M] : of expectation σ²;  freedom [M] : samples of each block; 0: left out;  block_s : s from block to block
+    Score: the Gaussian deviance Σ ν·(x/v + log v) with v from the other blocks alone (QLIKE, Patton 2011, J. Econometrics
+    160, 246-256). Beside a constant variance, anything pays 2·log(Σν) for its time constant, and log M for each change
+    point, whose place the block itself had a say in.
+    """
+    scaled = freedom * effective_share(square, freedom)
+    none = np.empty(0, dtype=np.int64)
+    points = change_points(square, scaled)
+    bases = [none, points] if len(points) else [none]
+    best, least = Memory(none, 1.0, math.inf), math.inf
+    for base in bases:
+        for tau in (math.inf, *TIME_CONSTANTS_S):
+            if tau < FEWEST_BLOCKS * block_s:
+                continue
+            memory = Memory(base, math.exp(-block_s / tau), tau)
+            alone = memory.average(square, scaled, low_pass)[1]
+            price = (2.0 * math.log(max(scaled.sum(), 2.0)) if tau < math.inf else 0.0) + len(base) * math.log(
+                len(square)
+            )
+            score = float(np.sum(scaled * (square / alone + np.log(alone)))) + price
+            if score < least:
+                best, least = memory, score
+    return best
+
+
+def effective_share(square: np.ndarray, freedom: np.ndarray) -> float:
+    """Degrees of freedom a sample, from how much neighbouring blocks differ: less than 1 in coloured noise.
+
+    Of two χ² mean squares a and b of ν degrees of freedom ((a - b)/(a + b))² has the mean 1/(ν + 1), whatever σ².
+    """
+    good = (freedom[1:] > 0) & (freedom[:-1] > 0)
+    first, second = square[1:][good], square[:-1][good]
+    total = first + second
+    alive = total > 0
+    if not alive.any():
+        return 1.0
+    spread = float(np.mean(((first - second)[alive] / total[alive]) ** 2))
+    return min(1.0, (1.0 / max(spread, 1e-12) - 1.0) / float(np.median(freedom[freedom > 0])))

@@ -1,0 +1,43 @@
+"""Fusion by the variances that parity shows, without smoothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from vgyro.fusion.array import ArrayRates, FilterParameters, Fused
+from vgyro.fusion.blocks import combined
+from vgyro.fusion.parity import Variances, parity_variances
+
+
+def parity_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
+    """Fixed minimum-variance weights from the constant variances of the parity space.
+
+    They hold in motion, where no gyro's own scatter is its noise. Faults that were found have no say: a gyro is left
+    out only where it is stuck all the time. A gyro that drifts is not known by its drift, but by its noise.
+    """
+    found = parity_variances(replace(array, faults=()), parameters, changing=False)
+    never = found.excluded.all(axis=0)
+    once = replace(
+        found, start=found.start[:1], stop=found.stop[:1], variance=found.variance[:1], excluded=never[None]
+    )  # fmt: skip
+    weights = once.weights(parameters.engine)[0]
+    return Fused.undelayed(combined(array.rate, weights), weights, found.note)
+
+
+def residual_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
+    """Minimum-variance weights of each block from variances that change with time; a gyro at fault has none."""
+    found = parity_variances(array, parameters)
+    weights = found.sample_weights(parameters.engine)
+    return Fused.undelayed(weights.combine(array.rate)[0], weights, f"{found.note}; {described(found)}")
+
+
+def described(found: Variances) -> str:
+    """How fast the variance of each gyro changes, in words."""
+    words = []
+    for tau, changes in zip(found.tau_s.tolist(), found.changes.tolist(), strict=True):
+        parts = [f"τ = {tau:g} s"] if np.isfinite(tau) else []
+        parts += [f"{changes} change points"] if changes else []
+        words.append(" and ".join(parts) or "constant")
+    return "variances: " + ", ".join(words)
