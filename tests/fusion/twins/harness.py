@@ -1,8 +1,8 @@
 """From a twin to arrays of rates whose truth is known, without a dump; every method on them; ratios over seeds.
 
-What the pipeline does to a recording is done with its own functions: noise from the rest, weights of CCC and DCC from block
-means, faults from the rates. Left out are the board's counts and the errors of the calibration: scales are right, and what
-is taken off each gyro is its true bias at the time of the calibration.
+What the pipeline does to a recording is done with its own functions: noise from the rest, weights of CCC and DCC from
+block means, faults from the rates. Left out are the board's counts and the errors of the calibration: scales are right,
+and what is taken off each gyro is its true bias at the time of the calibration.
 """
 
 from __future__ import annotations
@@ -70,10 +70,6 @@ class Case:
     faulty: np.ndarray
     definitions: tuple[str, ...] = ()
 
-    def moved(self, rate: float) -> Case:
-        """The same with a constant rate added; the weights of the level are then not known: make them again."""
-        return replace(self, array=replace(self.array, rate=self.array.rate + rate), truth=self.truth + rate)
-
 
 @dataclass(frozen=True)
 class Ran:
@@ -110,18 +106,20 @@ def case(
 ) -> Case:
     """One recording of a twin.
 
-    rate : constant rate that is added to every gyro and to the truth, deg/s; the recording then counts as one in motion
+    rate : constant rate that is added to every gyro and to the truth, deg/s: as the fuse stage adds one, a recording at
+           rest stays one by name; with `rest` it is added between those stretches
     rest : stretches, s, of which it is known that the board stood still; None: as the kind of the recording says
     volatility : weights of CCC and DCC; None: none
     faults : found by the fault stage;  parameters : of the methods, over those of the twin's own analysis
     """
     simulated = simulate_recording(twin, board_of(twin), recording, seed)
     offset = calibrated_bias(twin)
-    rates = np.asfortranarray(simulated.rates - offset + rate)
-    samples = len(rates)
-    at_rest = np.full(samples, twin.recording(recording).kind in AT_REST and rate == 0.0)
+    samples = len(simulated.time)
+    at_rest = np.full(samples, twin.recording(recording).kind in AT_REST and rest is None)
     for start, stop in rest or ():
         at_rest[(simulated.time >= start) & (simulated.time < stop)] = True
+    added = rate * ~at_rest if rest is not None else np.full(samples, rate)
+    rates = np.asfortranarray(simulated.rates - offset + added[:, None])
     array = ArrayRates(
         rates, simulated.rate_hz, np.zeros(samples, dtype=np.int32), at_rest, noise_of(twin, seed),
         temperature=simulated.temperature, stretch_time=np.zeros(1),
@@ -136,7 +134,7 @@ def case(
     return Case(
         array,
         known,
-        seen_rate(twin, simulated) + rate,
+        seen_rate(twin, simulated) + added,
         simulated.bias - offset,
         simulated.white_sd**2,
         correlation_matrix(twin.correlation, rates.shape[1]),
@@ -184,6 +182,7 @@ def with_weights(array: ArrayRates, time: np.ndarray, options: VolatilityOptions
     series = block_means(array.rate, array.rate_hz, options.rate_hz, array.segment, array.at_rest if partly else None)
     plan = rolling_windows(stretches(series.stretch), options.window, options.step)
     weights: dict[WeightKey, SampleWeights] = {}
+    deviations: dict[WeightKey, SampleWeights] = {}
     block = block_of_sample(time, series.time, 1.0 / series.rate_hz, array.rate_hz)
     names = [f"g{number + 1}" for number in range(array.rate.shape[1])]
     for definition in options.definitions if len(plan) else ():
@@ -197,7 +196,8 @@ def with_weights(array: ArrayRates, time: np.ndarray, options: VolatilityOptions
             )
             for mode, one in found.items():
                 weights[model, mode, definition] = SampleWeights.of(one.weights, block)
-    return replace(array, weights=weights)
+                deviations[model, mode, definition] = SampleWeights.of(one.deviation, block)
+    return replace(array, weights=weights, deviations=deviations)
 
 
 def with_faults(array: ArrayRates) -> ArrayRates:
