@@ -1,0 +1,230 @@
+"""Slow errors of the gyros, from their differences and where the board stands still, by a two-sided smoother.
+
+The common part of the biases cannot be told from the motion by differences: the biases are about the robust centre that
+their prior gives, and with the walk of the common part unseen, its variance grows with time. Standstill pins it. See
+vgyro.fusion.slow_model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.errors import DataError
+from vgyro.fusion.array import ArrayRates, FilterParameters
+from vgyro.fusion.blocks import SampleWeights, combined
+from vgyro.fusion.slow_blocks import SlowBlocks
+from vgyro.fusion.slow_choice import Choice, Walk, choose
+from vgyro.fusion.slow_model import Constants, Evidence, empirical_prior, posterior
+from vgyro.fusion.slow_smoother import run_smoother
+
+LEAST_RANGE = 1.0
+"""Range of the temperature, K, from which the biases may be regressed on it."""
+AS_A_WHOLE = "at rest as a whole: no anchors, or its rate would be set to zero"
+
+Weights = np.ndarray | SampleWeights
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """Temperature coefficients of the biases.
+
+    slope [N], deg/s/K, covariance [N, N]: what all gyros share in is known from standstill alone
+    reference : temperature at which they are zero, °C
+    """
+
+    slope: np.ndarray
+    covariance: np.ndarray
+    reference: float
+
+
+@dataclass(frozen=True)
+class SlowErrors:
+    """Slow errors of N gyros in B blocks of samples.
+
+    bias       : b̂ [B, N], deg/s, with what follows the temperature;  covariance : of b̂ - b [B, N, N], (deg/s)²
+    anchored   : standstill pins their common part
+    temperature : coefficients; None: not regressed on
+    walk       : the random walks as used;  constants : posterior of the initial biases (and slopes)
+    note       : what to know of them
+    """
+
+    blocks: SlowBlocks
+    bias: np.ndarray
+    covariance: np.ndarray
+    anchored: bool
+    temperature: Temperature | None
+    walk: Walk
+    constants: Constants
+    note: str
+
+    def at_samples(self, values: np.ndarray) -> np.ndarray:
+        """Values [B] of the blocks at the samples [T]: linear between the blocks' middles, held at the ends of a stretch."""
+        result = np.empty(int(self.blocks.first[-1] + self.blocks.length[-1]))
+        for samples, near in self.blocks.pieces(slice(0, len(result))):
+            result[samples] = self.blocks.between(samples, near, values)
+        return result
+
+
+def slow_errors(
+    array: ArrayRates,
+    parameters: FilterParameters,
+    variance: np.ndarray,
+    correlation: np.ndarray | None = None,
+    blocks: SlowBlocks | None = None,
+    tune: bool = True,
+) -> SlowErrors:
+    """Slow errors b_i(t) of the gyros, two-sided, so without delay, whatever the motion.
+
+    variance    : [N] or [B, N], (deg/s)² of a sample, such that variance/n is that of the mean of n samples: of coloured
+                  noise the long-run variance. A gyro whose variance is not finite or not above 0 is not used there
+    correlation : [N, N] of the noise; None: that of array.noise
+    blocks      : SlowBlocks.of(array);  tune : multiply K by what the likelihood of the blocks prefers
+    returns     : SlowErrors
+    raises      : DataError where the correlation is not positive definite, or the variance does not fit
+    Model: vgyro.fusion.slow_model; with the noise of the walks K_i·K_j·corr_ij, that of Bayard & Ploen
+    (US 2003/0187623), smoothed. Gyros at fault are left out of the blocks they touch.
+    """
+    blocks = SlowBlocks.of(array) if blocks is None else blocks
+    gyros = array.rate.shape[1]
+    if variance.shape not in ((gyros,), (len(blocks), gyros)):
+        raise DataError(
+            f"variance has the shape {variance.shape}", remedy=f"give [{gyros}] or [{len(blocks)}, {gyros}]"
+        )
+    variance = np.broadcast_to(np.asarray(variance, dtype=float), (len(blocks), gyros))
+    noise = array.noise.correlation if correlation is None else correlation
+    resting, why = _anchors(array, parameters, blocks)
+    degrees, why_not = _temperature(array, parameters, blocks)
+    centre = 0.0 if degrees is None else float(np.average(degrees, weights=blocks.length))
+    relative = None if degrees is None else degrees - centre
+    evidence = Evidence.of(array, blocks, variance, noise, resting, relative)
+    choice = choose(evidence, blocks, array.noise.rrw, array.noise.correlation, _usual_arw(variance, array), tune)
+    constants = posterior(choice.filtered, empirical_prior(choice.filtered, gyros))
+    state, covariance = run_smoother(choice.information, choice.filtered)
+    bias, covariance = _with_constants(state, covariance, constants, relative if choice.slopes else None)
+    slopes = slice(gyros, 2 * gyros)
+    warming = (
+        Temperature(constants.mean[slopes], constants.covariance[slopes, slopes], centre) if choice.slopes else None
+    )
+    parts = (why, why_not, _of_walk(array, choice.walk), _of_temperature(choice, evidence.anchored))
+    note = "; ".join(filter(None, parts))
+    return SlowErrors(blocks, bias, covariance, evidence.anchored, warming, choice.walk, constants, note)
+
+
+def _usual_arw(variance: np.ndarray, array: ArrayRates) -> np.ndarray:
+    """ARW [N], deg/s/√Hz, of the usual variance [B, N] of each gyro's samples."""
+    usable = np.where(np.isfinite(variance) & (variance > 0), variance, np.nan)
+    empty = np.isnan(usable).all(axis=0)
+    usable[:, empty] = 1.0
+    return np.sqrt(np.nanmedian(usable, axis=0) * array.period)
+
+
+def _with_constants(
+    state: np.ndarray, covariance: np.ndarray, constants: Constants, temperature: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Biases [B, N] and their covariance: b = walk of the measurement + (D - walk of the regressors D)·β."""
+    gyros = state.shape[1]
+    regressors = -state[..., 1:]
+    regressors[..., :gyros] += np.eye(gyros)
+    if temperature is not None:
+        regressors[..., gyros:] += temperature[:, None, None] * np.eye(gyros)
+    bias = state[..., 0] + regressors @ constants.mean
+    added = (regressors @ constants.covariance) @ regressors.transpose(0, 2, 1)
+    return bias, covariance + added
+
+
+def _anchors(array: ArrayRates, parameters: FilterParameters, blocks: SlowBlocks) -> tuple[np.ndarray, str]:
+    """Blocks in which the board stands still as a whole [B], and what is to be said of it."""
+    none = np.zeros(len(blocks), dtype=bool)
+    if not array.at_rest.any():
+        return none, "no standstill declared: a bias that all gyros share is not seen"
+    if array.at_rest.all():
+        return none, AS_A_WHOLE
+    if parameters.anchors == "off":
+        return none, "anchors are off: a bias that all gyros share is not seen"
+    resting = blocks.all(array.at_rest)
+    seconds = float(blocks.length[resting].sum()) * array.period
+    if not resting.any():
+        return none, "no block lies in standstill as a whole: a bias that all gyros share is not seen"
+    return resting, f"pinned to zero rate by {seconds:.4g} s of standstill; the Earth's rate there is taken for bias"
+
+
+def _temperature(array: ArrayRates, parameters: FilterParameters, blocks: SlowBlocks) -> tuple[np.ndarray | None, str]:
+    """Temperature of the blocks [B], °C, where it can be regressed on; else None and why."""
+    if array.temperature is None:
+        return None, ""
+    if parameters.temperature == "off":
+        return None, "temperature is off"
+    degrees = blocks.mean(array.temperature)
+    known = np.isfinite(degrees)
+    if not known.all():
+        return None, f"temperature unknown in {int((~known).sum())} of {len(known)} blocks: not regressed on"
+    span = float(np.ptp(degrees))
+    if span <= LEAST_RANGE:
+        return None, f"temperature within {span:.2g} K: not regressed on"
+    return degrees, ""
+
+
+def _of_walk(array: ArrayRates, walk: Walk) -> str:
+    unknown = np.flatnonzero(~np.isfinite(array.noise.rrw))
+    which = ", ".join(str(index + 1) for index in unknown)
+    if not np.isfinite(walk.multiplier):
+        if not walk.rrw.any():
+            return "no random walk of the biases is known, and the differences show none: they are constant"
+        return f"no random walk is known: one for all gyros, by likelihood (2Δ log L = {walk.gain:.1f})"
+    without = f"no random walk is known of gyro {which}: its bias is constant" if which else ""
+    tuned = f"K × {walk.multiplier:.2f} by likelihood (2Δ log L = {walk.gain:.1f})" if walk.multiplier != 1 else ""
+    return "; ".join(filter(None, [without, tuned]))
+
+
+def _of_temperature(choice: Choice, anchored: bool) -> str:
+    if not np.isfinite(choice.slopes_gain):
+        return ""
+    compared = f"2Δ log L = {choice.slopes_gain:.1f}, {choice.needed:.1f} needed"
+    if not choice.slopes:
+        return f"not regressed on the temperature ({compared})"
+    seen = "and standstill shows their common part" if anchored else "their common part is not seen"
+    return f"regressed on the temperature ({compared}): differences of the slopes between gyros, {seen}"
+
+
+def combined_without(array: ArrayRates, weights: Weights, slow: SlowErrors) -> np.ndarray:
+    """Σ u_i·(y_i - b̂_i) of the samples [T], deg/s.
+
+    weights : [N], [T, N] or SampleWeights;  b̂ is linear between the middles of its blocks
+    A piece at a time: beside the result little is made that is as long as the recording.
+    """
+    if isinstance(weights, np.ndarray) and weights.ndim == 1:
+        return combined(array.rate, weights) - slow.at_samples(slow.bias @ weights)
+    fused, first = np.empty(len(array.rate)), 0
+    for shares in weights.pieces() if isinstance(weights, SampleWeights) else [weights]:
+        rows = slice(first, first + len(shares))
+        for samples, near in slow.blocks.pieces(rows):
+            u = shares[samples.start - first : samples.stop - first]
+            fused[samples] = combined(array.rate[samples], u)
+            for gyro in range(u.shape[1]):
+                fused[samples] -= u[:, gyro] * slow.blocks.between(samples, near, slow.bias[:, gyro])
+        first = rows.stop
+    return fused
+
+
+def slow_variance(weights: Weights, slow: SlowErrors) -> np.ndarray:
+    """Variance of Σ u_i·(b_i - b̂_i) in each block [B], (deg/s)²: u'Pu.
+
+    weights : [N], [B, N] or SampleWeights, of which those of each block's middle count
+    """
+    if isinstance(weights, SampleWeights):
+        weights = _at_middles(weights, slow.blocks)
+    if weights.ndim == 1:
+        return slow.covariance @ weights @ weights
+    return np.einsum("bi,bij,bj->b", weights, slow.covariance, weights)
+
+
+def _at_middles(weights: SampleWeights, blocks: SlowBlocks) -> np.ndarray:
+    """Weights [B, N] of the sample in the middle of each block."""
+    middle, found, first = blocks.first + blocks.length // 2, [], 0
+    for shares in weights.pieces():
+        inside = slice(*np.searchsorted(middle, [first, first + len(shares)]))
+        found.append(shares[middle[inside] - first])
+        first += len(shares)
+    return np.concatenate(found)

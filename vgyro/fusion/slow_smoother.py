@@ -1,0 +1,122 @@
+"""Kalman filter and two-sided smoother of random walks, in information form, with constants that are regressed on.
+
+State b [N], b_t = b_{t-1} + noise of covariance Q_t, b = 0 before the first step. A block of measurements is its
+information: y has the weight matrix G (singular where a part of b cannot be seen), and only G, Gy and y'Gy matter. The
+columns of y are the measurement itself and k regressors, so that one run serves for every value of their coefficients β:
+what is left of y is y_0 - Σ β_j·y_j, and the filter is linear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Information:
+    """What the measurements of B blocks say of N states.
+
+    matrix : G [B, N, N], inverse covariance of each block's measurement
+    vector : G·y [B, N, 1 + k], of the measurement and of the k regressors
+    total  : Σ y'Gy [1 + k, 1 + k]
+    gap    : [B] s, time since the block before;  jump : [B, N], variance added to the walk of each state just before
+    """
+
+    matrix: np.ndarray
+    vector: np.ndarray
+    total: np.ndarray
+    gap: np.ndarray
+    jump: np.ndarray
+
+    def merged(self, first: np.ndarray) -> Information:
+        """Several blocks as one, as if the states stood still within; first [M], first block of each."""
+        time = np.cumsum(self.gap)
+        middle = np.add.reduceat(time, first) / np.diff(first, append=len(time))
+        matrix, vector, jump = (np.add.reduceat(one, first, axis=0) for one in (self.matrix, self.vector, self.jump))
+        return Information(matrix, vector, self.total, np.diff(middle, prepend=middle[:1]), jump)
+
+    def first_regressors(self, count: int) -> Information:
+        """With the first `count` regressors alone."""
+        kept = slice(1 + count)
+        return Information(self.matrix, self.vector[..., kept], self.total[kept, kept], self.gap, self.jump)
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """One-sided estimates, before each block's own measurement.
+
+    state : [B, N, 1 + k], of each column;  covariance : P [B, N, N];  keep : L = (I + P·G)⁻¹ [B, N, N]
+    squares : Σ e'We [1 + k, 1 + k] of the innovations e;  log_det : Σ log det(I + P·G)
+    """
+
+    state: np.ndarray
+    covariance: np.ndarray
+    keep: np.ndarray
+    squares: np.ndarray
+    log_det: float
+
+    def first_regressors(self, count: int) -> Filtered:
+        """What it is with the first `count` regressors alone."""
+        kept = slice(1 + count)
+        return replace(self, state=self.state[..., kept], squares=self.squares[kept, kept])
+
+
+def run_filter(blocks: Information, walk: np.ndarray) -> Filtered:
+    """Forward pass: P ← P + Q, L = (I + PG)⁻¹, P ← LP, x ← Lx + P·Gy.
+
+    blocks  : B blocks of measurements;  walk [N, N], (deg/s)²/s: Q_t = walk·gap_t + diag(jump_t)
+    The covariance form of the update with G singular: Bayard & Ploen, US 2003/0187623, where G is that of the parity.
+    """
+    number, states, columns = blocks.vector.shape
+    state, covariance = np.empty((number, states, columns)), np.empty((number, states, states))
+    keep, one = np.empty((number, states, states)), np.eye(states)
+    x, P = np.zeros((states, columns)), np.zeros((states, states))
+    jumps = set(np.flatnonzero(blocks.jump.any(axis=1)).tolist())
+    for index, gap in enumerate(blocks.gap.tolist()):
+        P = P + gap * walk
+        if index in jumps:
+            P = P + np.diag(blocks.jump[index])
+        state[index], covariance[index] = x, P
+        L = np.linalg.inv(one + P @ blocks.matrix[index])
+        keep[index] = L
+        P = L @ P
+        P = (P + P.T) * 0.5
+        x = L @ x + P @ blocks.vector[index]
+    squares = blocks.total - _fitted(blocks, state, keep @ covariance)
+    return Filtered(state, covariance, keep, squares, -float(np.linalg.slogdet(keep)[1].sum()))
+
+
+def _fitted(blocks: Information, state: np.ndarray, updated: np.ndarray) -> np.ndarray:
+    """Σ y'Gy - Σ e'We: e'We = e'Ge - (Ge)'P(Ge), with the updated P and e = y - x."""
+    seen = blocks.matrix @ state
+    left = blocks.vector - seen
+    across = _summed(state, blocks.vector)
+    return across + across.T - _summed(state, seen) + _summed(left, updated @ left)
+
+
+def _summed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Σ one'other over blocks and states: [B, N, a], [B, N, b] → [a, b]"""
+    return np.tensordot(one, other, axes=([0, 1], [0, 1]))
+
+
+def run_smoother(blocks: Information, filtered: Filtered) -> tuple[np.ndarray, np.ndarray]:
+    """Backward pass: two-sided estimates [B, N, 1 + k] of each column and covariance [B, N, N].
+
+    r ← W·e + L'r, Λ ← W + L'ΛL, W = L'G;  x_s = x + P·r, P_s = P - PΛP: the smoother of Bryson & Frazier (1963), equal
+    to that of Rauch, Tung & Striebel, and without the inverse of P, which is singular where a state does not walk.
+    """
+    keep = filtered.keep
+    turned = np.ascontiguousarray(keep.transpose(0, 2, 1))
+    score = turned @ (blocks.vector - blocks.matrix @ filtered.state)
+    weight = turned @ blocks.matrix
+    r, curvature = np.zeros_like(score[0]), np.zeros_like(weight[0])
+    for index in range(len(score) - 1, -1, -1):
+        back = turned[index]
+        r = score[index] + back @ r
+        curvature = weight[index] + back @ curvature @ keep[index]
+        score[index], weight[index] = r, curvature
+    P = filtered.covariance
+    smoothed = filtered.state + P @ score
+    covariance = P - P @ weight @ P
+    return smoothed, (covariance + covariance.transpose(0, 2, 1)) * 0.5
