@@ -7,6 +7,7 @@ allan   : overlapping Allan deviation
 kalman  : filters and smoother of a scalar rate
 statespace : likelihood and smoother of a state space that one series measures
 frames  : frames of a serial dump: synchronisation and checksums
+adaptive : extended Kalman filter of scale errors, bank of filters
 
 Each is a module, loaded at first use: `vgyro.engine.get("native").garch.fit_garch(...)`. The kernels are compiled
 for several instruction sets and chosen at run time; their results have the same bits on each, and for any number of
@@ -24,9 +25,10 @@ from vgyro.errors import EngineError
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
-    from vgyro.engine.native import allan, dcc, frames, garch, kalman, statespace, weights  # noqa: F401
+    from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, statespace, weights  # noqa: F401
 
     # Compiled: they have no Python source to read types from.
+    _adaptive: Any
     _allan: Any
     _cpu: Any
     _dcc: Any
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     _statespace: Any
     _weights: Any
 
-MODULES = ("garch", "dcc", "weights", "allan", "kalman", "statespace", "frames")
+MODULES = ("adaptive", "garch", "dcc", "weights", "allan", "kalman", "statespace", "frames")
 
 
 def __getattr__(name: str) -> ModuleType:

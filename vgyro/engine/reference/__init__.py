@@ -7,6 +7,7 @@ allan   : Allan deviation by allantools
 kalman  : filters by filterpy
 statespace : likelihood and smoother of a state space by filterpy
 frames  : frames of a serial dump by NumPy
+adaptive : extended Kalman filter and bank of filters by filterpy
 
 Each is a module, loaded at first use: `vgyro.engine.get("reference").garch.fit_garch(...)`.
 """
@@ -19,9 +20,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
-    from vgyro.engine.reference import allan, dcc, frames, garch, kalman, statespace, weights  # noqa: F401
+    from vgyro.engine.reference import adaptive, allan, dcc, frames, garch, kalman, statespace, weights  # noqa: F401
 
-MODULES = ("garch", "dcc", "weights", "allan", "kalman", "statespace", "frames")
+MODULES = ("adaptive", "garch", "dcc", "weights", "allan", "kalman", "statespace", "frames")
 
 
 def __getattr__(name: str) -> ModuleType:
