@@ -1,6 +1,7 @@
 """Noise coefficients: simulated truth, closed forms, coverage."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -68,6 +69,38 @@ def test_low_pass_factor_against_simulation():
     used = (curve.tau > 0.3) & (curve.tau < 20)
     expected = np.sqrt(low_pass_factor(curve.tau[used], constant) / curve.tau[used])
     np.testing.assert_allclose(curve.deviation[used], expected, rtol=0.05)
+
+
+@pytest.mark.parametrize("passes", [1, 2])
+@pytest.mark.parametrize("x", [0.3, 1.0, 3.0, 20.0])
+def test_low_pass_factor_against_the_integral_of_the_spectrum(passes: int, x: float):
+    # σ²(τ) = 2 ∫ S(f) 2 sin⁴(πfτ)/(πfτ)² df with S = 1/(1 + (2πf Tc)²)^passes, by quadrature; of white noise 1/τ.
+    from scipy.integrate import quad
+
+    def density(f: float) -> float:
+        return 4 * math.sin(math.pi * f * x) ** 4 / (math.pi * f * x) ** 2 / (1 + (2 * math.pi * f) ** 2) ** passes
+
+    edges = np.arange(200) / x
+    total = sum(quad(density, low or 1e-9, high)[0] for low, high in pairwise(edges))
+    # What lies beyond 199/τ: below 4 ∫ f^-2 (πx)^-2 (2πf)^(-2·passes) df.
+    assert low_pass_factor(np.array([x]), 1.0, passes)[0] == pytest.approx(x * total, rel=2e-5)
+
+
+def test_white_noise_after_a_smoother():
+    # The same low-pass forward and back, by scipy; the bandwidth is that of both. One series of an hour: 1.5 %.
+    from scipy.signal import lfilter
+
+    rate_hz, bandwidth = 50.0, 1.0
+    decay = math.exp(-2 * math.pi * bandwidth / math.sqrt(math.sqrt(2) - 1) / rate_hz)
+    white = N * np.sqrt(rate_hz) * np.random.default_rng(3).standard_normal(180_000)
+    once = lfilter([1 - decay], [1, -decay], white)
+    curve = allan_deviation(lfilter([1 - decay], [1, -decay], once[::-1])[::-1], rate_hz)
+    fit = noise_coefficients(curve, bandwidth_hz=bandwidth, passes=2, replicates=50)
+    assert fit.N.value == pytest.approx(N, rel=0.015)
+    assert fit.N.low <= N <= fit.N.high
+    np.testing.assert_allclose(model_deviation(curve.tau, fit, bandwidth, 2)[5:15], curve.deviation[5:15], rtol=0.05)
+    other = noise_coefficients(curve, bandwidth_hz=bandwidth, passes=0, replicates=50)
+    assert other.tau_from >= 1 / math.pi / bandwidth
 
 
 def test_white_noise_after_a_known_low_pass():

@@ -99,6 +99,47 @@ def test_figures_of_an_array():
         assert row["error_sigma"].low <= row["error_sigma"].value <= row["error_sigma"].high
 
 
+def test_nees_of_a_white_error():
+    # Known truth: (error/sd)² has mean 1 where sd is right, 4 where it is half of that; 95.4 % lie within ±2 s.d.
+    truth = swing(60)
+    sd = np.linspace(0.5, 1.5, truth.size)
+    rate = truth + sd * np.random.default_rng(8).standard_normal(truth.size)
+    reference = np.where(np.arange(truth.size) < 200, np.nan, truth)
+    options = MetricsOptions(bootstrap=200)
+    rows = dynamic_figures(
+        [rate] * 4, reference, RATE_HZ, np.zeros(truth.size, int), 1, options,
+        deviation=[None, sd, sd / 2, np.zeros(truth.size)].__getitem__,
+    )  # fmt: skip
+    assert "nees" not in rows[0]
+    for row, expected in zip(rows[1:3], (1.0, 4.0), strict=True):
+        # Mean of 29,800 chi² of one degree of freedom: s.d. √(2/29,800) = 0.8 %.
+        assert row["nees"].value == pytest.approx(expected, rel=0.03)
+        assert row["nees"].low < row["nees"].value < row["nees"].high
+        assert row["nees"].high / row["nees"].low == pytest.approx(1 + 4 * math.sqrt(2 / 29_800), abs=0.02)
+    inside = float(rows[1]["nees"].note.split(" ")[0])
+    assert inside == pytest.approx(95.45, abs=0.5)
+    assert rows[1]["nees"].note.split("; ")[0].endswith("% of the samples within ±2 s.d.")
+    assert math.isnan(rows[3]["nees"].value)
+    assert "not positive" in rows[3]["nees"].note
+
+
+def test_limits_of_nees_know_that_errors_last():
+    # An error that keeps for 2 s (first order): the limits hold 1 in about 95 of 100 tries; 88 % is far too few.
+    from scipy.signal import lfilter
+
+    truth, options, held = swing(60), MetricsOptions(bootstrap=200), 0
+    keep = math.exp(-1 / (2 * RATE_HZ))
+    for seed in range(40):
+        white = np.random.default_rng(seed).standard_normal(truth.size + 5000)
+        error = lfilter([math.sqrt(1 - keep**2)], [1, -keep], white)[5000:]
+        found = dynamic_figures(
+            [truth + error], truth, RATE_HZ, np.zeros(truth.size, int), 1, options,
+            deviation=lambda _: np.ones(truth.size),
+        )[0]["nees"]  # fmt: skip
+        held += found.low <= 1 <= found.high
+    assert held >= 30
+
+
 def test_unknown_reference_is_a_note_not_an_error():
     figures = dynamic_figures(
         [np.ones(100)] * 2, np.full(100, np.nan), RATE_HZ, np.zeros(100, dtype=int), 1, MetricsOptions(bootstrap=50)

@@ -49,6 +49,63 @@ def test_whatever_a_series_went_through_it_ends_at_the_same(own):
     np.testing.assert_allclose(found[1000:], wanted[1000:], atol=1e-9)
 
 
+def both_ways(signal: np.ndarray, bandwidth_hz: float, gain: float = 1.0) -> np.ndarray:
+    """The low-pass by scipy, forward and back; bandwidth of both: 1/(1 + (f/a)²)² is 1/2 at f = a·√(√2 - 1)."""
+    own = bandwidth_hz / math.sqrt(math.sqrt(2) - 1)
+    return gain * low_passed(low_passed(signal, own)[::-1], own)[::-1]
+
+
+@pytest.mark.parametrize("own", [0.5, 2.0, 10.0], ids=["narrower", "the same", "wider"])
+def test_a_smoother_ends_at_the_same_bandwidth(own):
+    # The same white noise, smoothed forward and back with any bandwidth: inside, sample by sample the same series.
+    white = np.random.default_rng(2).standard_normal(5000)
+    equaliser = Equaliser.of(2.0, RATE_HZ, np.zeros(len(white), int), back=True)
+    kept = slice(equaliser.settling, len(white) - equaliser.settling)
+    found = equaliser.apply(both_ways(white, own, 0.7), LowPass(own, 0.7, 2))
+    assert len(found) == len(white) - 2 * equaliser.settling
+    wanted = both_ways(white, 2.0)[kept]
+    np.testing.assert_allclose(found, wanted, atol=2e-3)
+    np.testing.assert_allclose(found[1000:-1000], wanted[1000:-1000], atol=1e-9)
+
+
+def test_half_of_the_power_passes_at_the_common_bandwidth():
+    # Tones at 2 Hz and far below through a wider smoother, then the equaliser: their amplitudes stand as 1 to √2.
+    time = np.arange(20_000) / RATE_HZ
+    for frequency, share in ((0.02, 1.0), (2.0, 0.5)):
+        smoothed = both_ways(np.sin(2 * np.pi * frequency * time), 8.0)
+        equaliser = Equaliser.of(2.0, RATE_HZ, np.zeros(len(time), int), back=True)
+        found = equaliser.apply(smoothed, LowPass(8.0, 1.0, 2))
+        # The discrete pole differs from the continuous one by (2πa/rate)²/12 or so.
+        assert 2 * np.mean(found**2) == pytest.approx(share, rel=0.01)
+
+
+def test_a_smoother_of_another_shape_is_left_out_and_sets_no_bandwidth():
+    # Two gyros, their average, low-passed at 1 Hz; a smoother; and a running mean over 2 s, -3 dB at about 0.22 Hz.
+    gyros = np.random.default_rng(5).standard_normal((40_000, 2))
+    average = gyros.mean(axis=1)
+    running = np.convolve(average, np.full(200, 1 / 200), mode="same")
+    series = [*gyros.T, low_passed(average, 1.0), both_ways(average, 1.0), running]
+    filters = [LowPass(), LowPass(), LowPass(1.0), LowPass(1.0, passes=2), LowPass(0.22, passes=0)]
+    sampling = Sampling.of(RATE_HZ, np.zeros(len(average), int))
+    found = static_figures(series, sampling, 2, filters, OPTIONS).readings
+    alone = static_figures(series[:4], sampling, 2, filters[:4], OPTIONS).readings
+    for row, other in zip(found[:4], alone, strict=True):
+        assert row["sigma_equal"].value == other["sigma_equal"].value
+        assert row["sigma_equal"].note.startswith("low-passed to 1 Hz")
+    assert math.isnan(found[4]["sigma_equal"].value)
+    assert found[4]["sigma_equal"].note == "its smoother has another shape"
+    assert "if_sigma_equal" not in found[4]
+    for name in ("arw", "arw_1s"):
+        assert found[4][name].note.startswith("band-limited")
+        assert "the low-pass takes part" in found[4][f"if_{name}"].note
+        assert "band-limited" not in found[3]["arw"].note
+    # Closed form: the noise bandwidths of the two shapes of one -3 dB bandwidth are π/2·B and π/4·B/√(√2 - 1).
+    share = math.sqrt(1 / (2 * math.sqrt(math.sqrt(2) - 1)))
+    assert found[3]["sigma_equal"].value / found[2]["sigma_equal"].value == pytest.approx(share, rel=0.02)
+    assert f"{share:.2f} of the 1σ" in found[3]["sigma_equal"].note
+    assert f"{share:.2f} of the 1σ" in found[3]["if_sigma_equal"].note
+
+
 def test_each_stretch_begins_anew_and_loses_its_settling():
     values = np.concatenate([np.full(500, 3.0), np.full(40, 9.0), np.full(500, -1.0)])
     equaliser = Equaliser.of(2.0, RATE_HZ, np.repeat([0, 1, 2], [500, 40, 500]))
@@ -62,6 +119,8 @@ def test_the_common_bandwidth():
     assert common_bandwidth([LowPass(), LowPass(1.0), LowPass(0.3)], None) == 0.3
     assert common_bandwidth([LowPass(), LowPass(1.0)], 5.0) == 5.0
     assert common_bandwidth([LowPass(), LowPass()], None) is None
+    assert common_bandwidth([LowPass(), LowPass(0.1, passes=0), LowPass(0.3, passes=2)], None) == 0.3
+    assert common_bandwidth([LowPass(0.1, passes=0)], None) is None
 
 
 def test_filters_and_a_low_passed_average_have_the_same_sigma():

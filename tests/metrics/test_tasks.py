@@ -51,6 +51,7 @@ def write_rates(
     write_table(folder / "rates.parquet", columns, "rates", NOWHERE, extra)
     fused = {"time": columns["time"], "segment": columns["segment"], "average": rate.mean(axis=1)}
     fused["dcc_causal[level]"] = rate[:, :2].mean(axis=1)
+    fused["sd_average"] = np.full(len(rate), N * math.sqrt(RATE_HZ / rate.shape[1]), dtype=np.float32)
     write_table(folder / "fused.parquet", fused, "fused", NOWHERE)
     write_table(
         folder / "moved.parquet",
@@ -65,6 +66,7 @@ def write_rates(
         "column": ["average", "dcc_causal[level]", ""],
         "bandwidth_hz": [math.nan, math.nan, math.nan],
         "dc_gain": [1.0, 1.0, math.nan],
+        "passes": [1, 0, 0],
     }
     write_table(folder / "methods.parquet", methods, "methods", NOWHERE)
 
@@ -134,6 +136,9 @@ def test_moving_recording_against_its_reference(tmp_path: Path, board: Board):
     assert rows["average", "", "error_sigma"]["value"] == pytest.approx(N * math.sqrt(RATE_HZ / number), rel=0.05)
     assert rows["average", "", "amplitude"]["value"] == pytest.approx(62.8, rel=2e-3)
     assert ("average", "", "arw") not in rows
+    # White errors and their true standard deviation: chi² of one degree of freedom, 6000 of them.
+    assert rows["average", "", "nees"]["value"] == pytest.approx(1.0, abs=4 * math.sqrt(2 / 6000))
+    assert ("dcc_causal", "level", "nees") not in rows
     assert len(read_columns(tmp_path / "allan.parquet")["tau"]) == 0
     record = run_noise(tmp_path, board)
     assert "differences" in record["method"]

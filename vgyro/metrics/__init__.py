@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, model_deviation, noise_coefficients
     from vgyro.metrics.correlation import Correlation, correlation_matrix
     from vgyro.metrics.dynamic import DynamicErrors, dynamic_errors
-    from vgyro.metrics.equal_bandwidth import Equaliser, LowPass, common_bandwidth
+    from vgyro.metrics.equal_bandwidth import Equaliser, LowPass, common_bandwidth, run_back
     from vgyro.metrics.figures import FIGURES, Figure, Reading
     from vgyro.metrics.improvement import improvement_by_draws, improvement_factor, improvement_of_deviation
     from vgyro.metrics.outliers import find_outliers
@@ -72,6 +72,7 @@ __all__ = [
     "paper_readings",
     "read_curve",
     "resample",
+    "run_back",
     "share_tones",
     "spectral_density",
     "stretches",
@@ -89,7 +90,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(("Correlation", "correlation_matrix"), "correlation"),
         **dict.fromkeys(("CrossAllan", "cross_allan"), "allan_covariance"),
         **dict.fromkeys(("DynamicErrors", "dynamic_errors"), "dynamic"),
-        **dict.fromkeys(("Equaliser", "LowPass", "common_bandwidth"), "equal_bandwidth"),
+        **dict.fromkeys(("Equaliser", "LowPass", "common_bandwidth", "run_back"), "equal_bandwidth"),
         **dict.fromkeys(("FIGURES", "Figure", "Reading"), "figures"),
         **dict.fromkeys(("improvement_by_draws", "improvement_factor", "improvement_of_deviation"), "improvement"),
         "find_outliers": "outliers",

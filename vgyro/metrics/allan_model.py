@@ -34,15 +34,19 @@ SHAPES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 
 
-def low_pass_factor(tau: np.ndarray, constant: float) -> np.ndarray:
+def low_pass_factor(tau: np.ndarray, constant: float, passes: int = 1) -> np.ndarray:
     """Allan variance of white noise after a first-order low-pass of time constant `constant` s, over that before.
 
-    1 - (Tc/2τ)(3 - 4e^(-τ/Tc) + e^(-2τ/Tc)): a first-order Gauss-Markov rate, IEEE Std 952-1997, annex C.
+    passes 1 : 1 - (3 - 4e^-x + e^-2x)/2x, x = τ/Tc: a first-order Gauss-Markov rate, IEEE Std 952-1997, annex C
+    passes 2 : the same low-pass forward and back, autocovariance (1 + u/Tc)e^(-u/Tc)/4Tc:
+               1 - (9 - 4(x + 3)e^-x + (2x + 3)e^-2x)/4x
     """
     if constant == 0:
         return np.ones_like(tau)
-    ratio = constant / tau
-    return 1 - ratio / 2 * (3 - 4 * np.exp(-1 / ratio) + np.exp(-2 / ratio))
+    x = tau / constant
+    if passes == 2:
+        return 1 - (9 - 4 * (x + 3) * np.exp(-x) + (2 * x + 3) * np.exp(-2 * x)) / (4 * x)
+    return 1 - (3 - 4 * np.exp(-x) + np.exp(-2 * x)) / (2 * x)
 
 
 @dataclass(frozen=True)
@@ -60,17 +64,21 @@ class Curve:
 
 @dataclass(frozen=True)
 class Model:
-    """Terms of the model at the τ [M] of a curve, and their columns [M, C]; constant : Tc of a known low-pass, s"""
+    """Terms of the model at the τ [M] of a curve, and their columns [M, C].
+
+    constant, passes : Tc of a known first-order low-pass, s, and how often the series went through it
+    """
 
     terms: str
     tau: np.ndarray
     constant: float = 0.0
+    passes: int = 1
     columns: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         columns = np.column_stack([SHAPES[term](self.tau) for term in self.terms])
         if "N" in self.terms:
-            columns[:, self.terms.index("N")] *= low_pass_factor(self.tau, self.constant)
+            columns[:, self.terms.index("N")] *= low_pass_factor(self.tau, self.constant, self.passes)
         object.__setattr__(self, "columns", columns)
 
     @property
@@ -81,11 +89,11 @@ class Model:
     def with_terms(self, terms: str) -> Model:
         """The same with more terms, in the order of the module."""
         every = set(self.terms + terms)
-        return Model("".join(term for term in SHAPES if term in every), self.tau, self.constant)
+        return Model("".join(term for term in SHAPES if term in every), self.tau, self.constant, self.passes)
 
     def since(self, first: int) -> Model:
         """Without the first τ."""
-        return Model(self.terms, self.tau[first:], self.constant)
+        return Model(self.terms, self.tau[first:], self.constant, self.passes)
 
     def at(self, squares: np.ndarray, variance: np.ndarray) -> np.ndarray:
         """Allan variance [M] of the model, never below a small part of `variance` [M]."""

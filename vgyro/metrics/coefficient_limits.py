@@ -54,7 +54,11 @@ def correlation_of(model: Model, squares: np.ndarray) -> np.ndarray:
     found = dict(zip(model.terms, squares.tolist(), strict=True))
     frequency = np.geomspace(1 / (30 * tau[-1]), 4 / tau[0], 64 * int(np.ceil(np.log2(120 * tau[-1] / tau[0]))))
     angular = 2 * np.pi * frequency
-    spectrum = found["N"] / (1 + (angular * model.constant) ** 2) + found["B"] / angular + found["K"] / angular**2
+    spectrum = (
+        found["N"] / (1 + (angular * model.constant) ** 2) ** model.passes
+        + found["B"] / angular
+        + found["K"] / angular**2
+    )
     if "Q" in found:
         spectrum += found["Q"] * tau[0] * angular**2 * (2 * tau[0] * frequency < 1)
     phase = np.pi * frequency * tau[:, None]

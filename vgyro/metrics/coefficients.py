@@ -10,6 +10,7 @@ import numpy as np
 from vgyro.metrics.allan import AllanCurve
 from vgyro.metrics.allan_model import BASE, FREE, SHAPES, Curve, Model, fit, low_pass_factor
 from vgyro.metrics.coefficient_limits import Drawing, Limits, chance_of_gain
+from vgyro.metrics.equal_bandwidth import LowPass
 
 __all__ = ["Coefficient", "NoiseCoefficients", "low_pass_factor", "model_deviation", "noise_coefficients"]
 
@@ -63,14 +64,17 @@ def noise_coefficients(
     replicates: int = 500,
     seed: int = 0,
     confidence: float | None = None,
+    passes: int = 1,
 ) -> NoiseCoefficients:
     """Fit σ²(τ) = N²/τ + (2 ln2/π)B² + K²τ/3, with 3Q²/τ² and R²τ²/2 where the curve shows them.
 
     curve        : of a rate in deg/s; Allan deviation, overlapping or robust
     bandwidth_hz : -3 dB bandwidth of a first-order low-pass that the series went through; its effect on the white term
-                   is put into the model and τ < 2Tc is left out; None: not limited
+                   is put into the model and τ < 1/(π·bandwidth_hz), 2Tc of one pass, is left out; None: not limited
     dc_gain      : gain of that filter for a constant rate; all coefficients are divided by it
     replicates   : draws for the limits;  seed : of all draws;  confidence : None takes that of the curve
+    passes       : 2, forward and back, bandwidth_hz that of both; 0: the low-pass has another shape, which nothing is
+                   known of but that τ
     returns      : NoiseCoefficients, NaN with a note where the curve has fewer than 3 points
     raises       : ValueError for a modified or Hadamard deviation, whose terms have other shapes
     Reweighted non-negative least squares on σ², weight edf/2; its scatter for N, B and K is near the Cramér-Rao bound.
@@ -85,8 +89,9 @@ def noise_coefficients(
     """
     if curve.kind not in FITTED_KINDS:
         raise ValueError(f"no coefficients of a {curve.kind} deviation: its terms have other shapes")
-    constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
-    used = np.isfinite(curve.deviation) & (curve.edf > 0) & (curve.tau >= 2 * constant)
+    low_pass = LowPass(bandwidth_hz, dc_gain, passes)
+    shortest = 1 / (math.pi * bandwidth_hz) if bandwidth_hz else 0.0
+    used = np.isfinite(curve.deviation) & (curve.edf > 0) & (curve.tau >= shortest)
     if used.sum() < len(BASE):
         note = "fewer than 3 points of the Allan curve"
         return NoiseCoefficients(UNKNOWN, UNKNOWN, UNKNOWN, math.nan, math.nan, note)
@@ -95,7 +100,7 @@ def noise_coefficients(
         zero = Coefficient(0.0, 0.0, 0.0)
         return NoiseCoefficients(zero, zero, zero, float(whole.tau[0]), 0.0, "the series is constant", zero, zero)
     drawing = Drawing(replicates, seed)
-    model, first = _describe(whole, constant, Drawing(DRAWS, seed))
+    model, first = _describe(Model(BASE, whole.tau, low_pass.constant, passes), whole, Drawing(DRAWS, seed))
     fitted = whole.since(first)
     squares = fit(model, fitted)
     tail = (1 - (curve.confidence if confidence is None else confidence)) / 2
@@ -106,19 +111,18 @@ def noise_coefficients(
     misfit = _misfit(model, squares, fitted)
     result = {term: Coefficient(*(math.sqrt(value) / dc_gain for value in three)) for term, three in found.items()}
     tau_from = float(fitted.tau[0])
-    note = _note(model, squares, tau_from if first or constant else None, misfit)
+    note = _note(model, squares, tau_from if first or shortest else None, misfit)
     return NoiseCoefficients(**result, tau_from=tau_from, misfit=misfit, note=note)
 
 
-def _describe(curve: Curve, constant: float, drawing: Drawing) -> tuple[Model, int]:
+def _describe(base: Model, curve: Curve, drawing: Drawing) -> tuple[Model, int]:
     """The model that describes the curve from the first τ, of that index, on."""
-    model, first = _at_short_tau(curve, constant, drawing)
+    model, first = _at_short_tau(base, curve, drawing)
     return (model.with_terms("R") if _shows(model, "R", curve.since(first), drawing) else model), first
 
 
-def _at_short_tau(curve: Curve, constant: float, drawing: Drawing) -> tuple[Model, int]:
-    base = Model(BASE, curve.tau, constant)
-    if constant or len(curve.tau) < FEWEST_POINTS:
+def _at_short_tau(base: Model, curve: Curve, drawing: Drawing) -> tuple[Model, int]:
+    if base.constant or len(curve.tau) < FEWEST_POINTS:
         return base, 0
     first, free = _first_fitting(base, curve), base.with_terms(FREE)
     start = _first_fitting(free, curve) if first else 0
@@ -188,10 +192,12 @@ def _note(model: Model, squares: np.ndarray, late: float | None, misfit: float) 
     return ", ".join(notes)
 
 
-def model_deviation(tau: np.ndarray, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None) -> np.ndarray:
+def model_deviation(
+    tau: np.ndarray, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None, passes: int = 1
+) -> np.ndarray:
     """Allan deviation of the fitted model at `tau` s, in deg/s; terms that were not estimated are left out."""
-    constant = 1 / (2 * math.pi * bandwidth_hz) if bandwidth_hz else 0.0
-    model = Model(BASE + "QR", np.asarray(tau, dtype=float), constant)
+    constant = LowPass(bandwidth_hz, passes=passes).constant
+    model = Model(BASE + "QR", np.asarray(tau, dtype=float), constant, passes)
     squares = np.array([getattr(coefficients, term).value ** 2 for term in model.terms])
     squares[len(BASE) :] = np.nan_to_num(squares[len(BASE) :])
     return np.sqrt(model.columns @ squares)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,6 +77,11 @@ class Drawn:
             self.mean * factor, self.variance * factor**2, self.variance_expected * factor**2, self.lowest * factor,
             self.lowest_expected * factor, self.block_s,
         )  # fmt: skip
+
+    def only(self, series: list[int]) -> Drawn:
+        """The draws of some of the series."""
+        names = ("mean", "variance", "variance_expected", "lowest", "lowest_expected")
+        return replace(self, **{name: getattr(self, name)[:, series] for name in names})
 
 
 def fit_drift(found: CrossAllan, singles: int, shortest: float = 0.0) -> DriftModel | None:

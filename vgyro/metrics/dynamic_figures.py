@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,10 +17,17 @@ from vgyro.metrics.improvement import improvement_factor
 from vgyro.metrics.readings import moments
 from vgyro.metrics.sampling import Sampling
 from vgyro.metrics.truth import Truth, known_stretches
+from vgyro.metrics.unit_grid import UnitGrid
 
 SHIFTED = ("error_sigma_aligned", "error_sigma_scaled", "amplitude", "delay", "phase")
 OF_ERROR = "of the error"
 NO_SINUSOID = "the reference is no sinusoid"
+WIDE = 2.0
+"""Standard deviations within which 95.4 % of a Gaussian lie: the share that the note on NEES tells."""
+
+
+def _no_deviation(series: int) -> None:  # noqa: ARG001
+    return None
 
 
 def dynamic_figures(
@@ -30,6 +38,7 @@ def dynamic_figures(
     singles: int,
     options: MetricsOptions,
     sampling: Sampling | None = None,
+    deviation: Callable[[int], np.ndarray | None] = _no_deviation,
 ) -> list[dict[str, Reading]]:
     """Errors of series against the true rate, and improvement factors of the virtual gyros.
 
@@ -37,6 +46,7 @@ def dynamic_figures(
     reference : array [T], deg/s; NaN where it is not known
     segment   : array [T] int, number of the gap-free stretch
     sampling  : of the T samples, for the angle; None: each gap ends a stretch
+    deviation : place of a series → its posterior standard deviation, array [T], deg/s; None: it has none, and no NEES
     returns   : S dictionaries, name → Reading; where the reference does not change, delay and what depends on it are
                 NaN with a note. Limits by moving-block bootstrap, the improvement factors with common blocks.
     """
@@ -55,19 +65,38 @@ def dynamic_figures(
     angle = AngleGrid.of((sampling or Sampling.of(rate_hz, segment)).without(~known))
     raw: list[Units] = []
     readings = []
-    for values in series:
+    for place, values in enumerate(series):
         rate = values if everywhere else values[known]
         error = rate - truth.reference
         units, drift = grid.units_of(error), angle.drift(error, options.confidence)
-        del error
         of_error = moments(units, 0, options.bootstrap, options.seed, options.confidence)
         row = {"error_mean": of_error["mean"], "error_sigma": of_error["sigma"], "angle_drift_60s": drift}
+        sd = deviation(place)
+        if sd is not None:
+            row["nees"] = nees(error, sd if everywhere else sd[known], grid, options)
+        del error, sd
         readings.append(row | _shifted(errors_of(rate, truth), options))
         raw.append(units)
     drawn = resample(joined(raw), options.bootstrap, options.seed)
     for column in range(singles, len(readings)):
         readings[column].update(_factors(readings, drawn, singles, column, options.confidence))
     return readings
+
+
+def nees(error: np.ndarray, sd: np.ndarray, grid: UnitGrid, options: MetricsOptions) -> Reading:
+    """Normalised error squared: mean of (error/sd)², which is 1 where the standard deviations are honest.
+
+    error, sd : arrays [T], deg/s;  grid : of these samples
+    returns   : limits by moving-block bootstrap; NaN with a note if some sd is not a positive number
+    Bar-Shalom, Li & Kirubarajan (2001), Estimation with Applications to Tracking and Navigation, section 5.4.
+    """
+    if not (np.isfinite(sd) & (sd > 0)).all():
+        return Reading(math.nan, math.nan, math.nan, "some posterior standard deviations are not positive")
+    ratio = np.square(error / sd)
+    inside = float(np.mean(ratio <= WIDE**2))
+    units = grid.units_of(ratio)
+    found = moments(units, 0, options.bootstrap, options.seed, options.confidence)["mean"]
+    return replace(found, note=f"{100 * inside:.1f} % of the samples within ±{WIDE:g} s.d.; {found.note}")
 
 
 def _shifted(error: DynamicErrors, options: MetricsOptions) -> dict[str, Reading]:

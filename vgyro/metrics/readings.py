@@ -11,6 +11,7 @@ from vgyro import units
 from vgyro.metrics.allan import AllanCurve, read_curve
 from vgyro.metrics.bootstrap import Units, percentile_limits, resample, scale_limits
 from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, low_pass_factor
+from vgyro.metrics.equal_bandwidth import OTHER_SHAPE, LowPass
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.improvement import log_variance, normal_quantile
 from vgyro.metrics.spectrum import Spectrum, flat_band, noise_density
@@ -20,6 +21,7 @@ BEYOND_MINIMUM = 2.0
 BAND_LIMITED = 0.98
 BAND_LIMITED_WORD = "band-limited"
 FEWEST_FREEDOM = 1.0
+SMOOTHER = f"{BAND_LIMITED_WORD}: a smoother limits the band, N is not that of white noise"
 AGREEMENT = 0.01  # noise density and N, which are the same for white noise
 
 
@@ -30,22 +32,25 @@ def paper_readings(
     rate_hz: float,
     bandwidth_hz: float | None = None,
     dc_gain: float = 1.0,
+    passes: int = 1,
 ) -> dict[str, Reading]:
     """Noise density, ARW, RRW, bias drift, bias instability, quantisation and ramp of one series in the field's units.
 
     curve, spectrum, coefficients : of the series, in deg/s
-    bandwidth_hz, dc_gain : -3 dB bandwidth (None: not limited) and gain for a constant of a filter that it went through
+    bandwidth_hz, dc_gain, passes : of a filter that it went through, as LowPass; a bandwidth of None: not limited
     returns : noise_density deg/s/√Hz (two-sided), arw_1s and arw deg/√h, density_ratio, quantisation deg, rrw_read and
               rrw deg/h/√h, rate_ramp deg/h², bias_drift and bias_instability deg/h, bias_drift_tau s
     Jiang et al. (2012), table 2; Liu et al. (2015), table 3; IEEE Std 952-1997 for the fitted terms.
     """
+    low_pass = LowPass(bandwidth_hz, dc_gain, passes)
+    notes = [SMOOTHER if low_pass.other_shape else "", coefficients.note]
     density = noise_density(spectrum, flat_band(rate_hz, bandwidth_hz), curve.confidence)
     drift, drift_tau = bias_drift(curve)
     level = Reading(density.value, density.low, density.high, _density_note(density.value, density.band))
     return {
         "noise_density": level,
-        "arw_1s": _arw_at_one_second(curve, bandwidth_hz),
-        "arw": _fitted(coefficients.N, units.arw_deg_rt_h, coefficients.note),
+        "arw_1s": _arw_at_one_second(curve, low_pass),
+        "arw": _fitted(coefficients.N, units.arw_deg_rt_h, "; ".join(filter(None, notes))),
         "density_ratio": density_ratio(level, coefficients.N, curve.confidence, dc_gain),
         "quantisation": _fitted(coefficients.Q, float, coefficients.note),
         "rrw_read": rrw_read(curve),
@@ -140,11 +145,13 @@ def rrw_read(curve: AllanCurve) -> Reading:
     return Reading(value, low, high, span) if rises else Reading(value, 0.0, high, f"no rise, an upper limit; {span}")
 
 
-def _arw_at_one_second(curve: AllanCurve, bandwidth_hz: float | None) -> Reading:
+def _arw_at_one_second(curve: AllanCurve, low_pass: LowPass) -> Reading:
     value, low, high = (float(units.arw_deg_rt_h(read)) for read in read_curve(curve, 1.0))
     note = "" if math.isfinite(value) else "the curve does not reach τ = 1 s"
-    if bandwidth_hz:
-        kept = math.sqrt(float(low_pass_factor(np.array([1.0]), 1 / (2 * math.pi * bandwidth_hz))[0]))
+    if low_pass.other_shape:
+        note = f"{BAND_LIMITED_WORD}: {OTHER_SHAPE}, which lowers σ(1 s) by itself"
+    elif low_pass.bandwidth_hz:
+        kept = math.sqrt(float(low_pass_factor(np.array([1.0]), low_pass.constant, low_pass.passes)[0]))
         if kept < BAND_LIMITED:
             note = f"{BAND_LIMITED_WORD}: the filter by itself lowers σ(1 s) to {kept:.2f} of the white level"
     return Reading(value, low, high, note)

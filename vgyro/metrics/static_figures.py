@@ -15,7 +15,7 @@ from vgyro.metrics.allan_covariance import CrossAllan, cross_allan
 from vgyro.metrics.array_moments import ArrayMoments, array_moments
 from vgyro.metrics.bootstrap import Resampled, joined, resample
 from vgyro.metrics.drift import Drawn, DriftModel, draw, fit_drift
-from vgyro.metrics.equal_bandwidth import SETTLED, LowPass, common_bandwidth
+from vgyro.metrics.equal_bandwidth import BY_SHAPE, OTHER_SHAPE, SETTLED, LowPass, common_bandwidth, run_back
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.improvement import (
     improvement_by_draws,
@@ -66,7 +66,7 @@ def static_figures(
     raises   : TooShort if no stretch has three samples
     """
     bandwidth_hz = common_bandwidth(filters, options.equal_bandwidth_hz)
-    shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses)
+    shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses, run_back(filters))
     return array_figures(shared, [shared.measure(*one) for one in zip(series, filters, strict=True)], singles)
 
 
@@ -93,6 +93,7 @@ class _Array:
     """All series of a recording, and their replicates.
 
     drawn : None where the recording is too short for a model of its drift
+    equal : moments at the common bandwidth, of the series that are `compared`
     """
 
     measured: Sequence[Measured]
@@ -103,6 +104,7 @@ class _Array:
     drawn: Drawn | None
     moments: ArrayMoments
     equal: ArrayMoments | None
+    compared: list[int]
 
     @classmethod
     def of(cls, shared: RestRecording, measured: Sequence[Measured], singles: int) -> _Array:
@@ -119,31 +121,32 @@ class _Array:
         drawn = None if model is None else _draw(model, shared, measured, felt)
         inside = [one.inside for one in measured if one.inside is not None]
         moments = array_moments(sums, joined(inside) if inside else None, resampled, drawn, unit_s, options)
-        same = [one.equal for one in measured if one.equal is not None]
+        compared = [place for place, one in enumerate(measured) if one.equal is not None]
         equal = None
-        if len(same) == len(measured):
-            gain = np.array([one.low_pass.dc_gain for one in measured])
-            at_gain = None if drawn is None else drawn.scaled(1 / gain)
-            units = joined(same)
+        if compared:
+            gain = np.array([measured[place].low_pass.dc_gain for place in compared])
+            at_gain = None if drawn is None else drawn.only(compared).scaled(1 / gain)
+            units = joined([one.equal for one in measured if one.equal is not None])
             of_them = resample(units, options.bootstrap, options.seed)
             equal = array_moments(units, None, of_them, at_gain, unit_s, options)
-        return cls(measured, singles, resampled, cross, model, drawn, moments, equal)
+        return cls(measured, singles, resampled, cross, model, drawn, moments, equal, compared)
 
     def factors(self, readings: list[dict[str, Reading]], column: int, confidence: float) -> dict[str, Reading]:
         """Improvement factors of one virtual gyro."""
         number, adev = self.singles, self.resampled.adev_1s
         at_one = self._improvement(readings, "arw_1s", column, adev, confidence)
-        if BAND_LIMITED_WORD in readings[column]["arw_1s"].note:
-            at_one = replace(at_one, note=f"{at_one.note}; the low-pass takes part in it".removeprefix("; "))
+        of_white = self._noise_factor(readings, column, confidence)
         found = {
             "if_mean": self.moments.mean_factor(number, column, confidence),
             "if_sigma": self.moments.sigma_factor(number, column, confidence),
-            "if_arw_1s": at_one,
-            "if_arw": self._noise_factor(readings, column, confidence),
+            "if_arw_1s": _marked(at_one, readings[column]["arw_1s"]),
+            "if_arw": _marked(of_white, readings[column]["arw"]),
             "if_bias_drift": self._drift_factor(readings, column, confidence),
         }
-        if self.equal is not None:
-            found["if_sigma_equal"] = self.equal.sigma_factor(number, column, confidence)
+        if self.equal is not None and column in self.compared:
+            factor = self.equal.sigma_factor(number, self.compared.index(column), confidence)
+            both = BY_SHAPE if self.measured[column].low_pass.both_ways else ""
+            found["if_sigma_equal"] = replace(factor, note="; ".join(filter(None, (factor.note, both))))
         return found
 
     def _improvement(
@@ -188,6 +191,13 @@ class _Array:
         return found
 
 
+def _marked(factor: Reading, reading: Reading) -> Reading:
+    """A factor of a figure that a low-pass lowers by itself says so."""
+    if BAND_LIMITED_WORD not in reading.note:
+        return factor
+    return replace(factor, note=f"{factor.note}; the low-pass takes part in it".removeprefix("; "))
+
+
 def _cross(shared: RestRecording, measured: Sequence[Measured]) -> CrossAllan | None:
     """Allan covariances of the 1 s means of all series; None where too few of them are there."""
     means = np.column_stack([one.seconds for one in measured])
@@ -211,10 +221,12 @@ def _add_equal(readings: list[dict[str, Reading]], shared: RestRecording, array:
     if shared.equaliser is None:
         return
     band = f"low-passed to {shared.equaliser.bandwidth_hz:.3g} Hz"
-    if array.equal is None:
-        nothing = Reading(math.nan, math.nan, math.nan, f"{band}: no stretch without a gap is long enough")
-        for row in readings:
-            row["sigma_equal"] = nothing
-        return
-    for row, found in zip(readings, array.equal.readings(confidence), strict=True):
-        row["sigma_equal"] = replace(found["sigma"], note=f"{band}; {found['sigma'].note}")
+    found = [] if array.equal is None else array.equal.readings(confidence)
+    known = dict(zip(array.compared, found, strict=True))
+    for place, (row, one) in enumerate(zip(readings, array.measured, strict=True)):
+        if place in known:
+            clauses = [band, *([BY_SHAPE] if one.low_pass.both_ways else []), known[place]["sigma"].note]
+            row["sigma_equal"] = replace(known[place]["sigma"], note="; ".join(clauses))
+            continue
+        why = OTHER_SHAPE if one.low_pass.other_shape else f"{band}: no stretch without a gap is long enough"
+        row["sigma_equal"] = Reading(math.nan, math.nan, math.nan, why)

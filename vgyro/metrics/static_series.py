@@ -27,6 +27,7 @@ class Measured:
     """Of one series: Allan curves by kind, spectrum, figures so far, and the sums that the others need.
 
     sums, inside, equal : units of the samples; of the samples without the means of their poses; at the common bandwidth
+                          (None: it cannot be brought there)
     seconds [B]         : means of the units that are 0.9 full, outliers replaced, deg/s
     """
 
@@ -77,13 +78,14 @@ class RestRecording:
         bandwidth_hz: float | None = None,
         engine: str = "native",
         poses: bool = False,
+        back: bool = False,
     ) -> RestRecording:
-        """bandwidth_hz : at which 1σ is compared, Hz; None: it is not"""
+        """bandwidth_hz : at which 1σ is compared, Hz; None: it is not;  back : a series was filtered backward"""
         segment, grid = sampling.segment, sampled_grid(sampling)
         places, seconds = grid.seconds()
         equaliser = equal = None
         if bandwidth_hz is not None:
-            equaliser = Equaliser.of(bandwidth_hz, sampling.rate_hz, segment, engine)
+            equaliser = Equaliser.of(bandwidth_hz, sampling.rate_hz, segment, engine, back)
             equal = unit_grid(equaliser.cuts, sampling.rate_hz)
         angle = AngleGrid.of(sampling, each=poses)
         missing = sampling.missing
@@ -113,8 +115,9 @@ class RestRecording:
         }  # fmt: skip
         spectrum = spectral_density(cleaned, rate_hz, options.welch_s, self.segment)
         curve = curves["overlapping"]
-        fitted = noise_coefficients(curve, low_pass.bandwidth_hz, low_pass.dc_gain, options.bootstrap, options.seed)
-        readings = paper_readings(curve, spectrum, fitted, rate_hz, low_pass.bandwidth_hz, low_pass.dc_gain)
+        band, gain, passes = low_pass.bandwidth_hz, low_pass.dc_gain, low_pass.passes
+        fitted = noise_coefficients(curve, band, gain, options.bootstrap, options.seed, passes=passes)
+        readings = paper_readings(curve, spectrum, fitted, rate_hz, band, gain, passes)
         readings["missing"] = counted(self.missing)
         if options.outlier_threshold is not None:
             readings["outliers"] = counted(int(outliers.sum()))
@@ -130,7 +133,7 @@ class RestRecording:
         return self.grid.units_of(without_means(values, self.sampling.stretch)) if self.poses else None
 
     def _equal(self, values: np.ndarray, low_pass: LowPass) -> Units | None:
-        if self.equaliser is None or self.equal is None or self.equal.samples == 0:
+        if self.equaliser is None or self.equal is None or self.equal.samples == 0 or low_pass.other_shape:
             return None
         values = without_means(values, self.sampling.stretch) if self.poses else values
         return self.equal.units_of(self.equaliser.apply(values, low_pass))

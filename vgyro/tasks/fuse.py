@@ -21,10 +21,10 @@ from vgyro.fusion import Outcome, measured_response, run_methods, select
 from vgyro.storage.tables import ROW_GROUP, TableWriter, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.fusion_inputs import OpenArray, open_array
+from vgyro.tasks.rates_file import DEVIATION
 
 TEXTS = ("method", "definition", "column", "title", "source", "family", "needs", "inferred")
 FIGURES = ("dc_gain", "bandwidth_hz", "noise_bandwidth_hz", "delay_s")
-SD = "sd_{}"
 Row = dict[str, Any]
 ONE_GYRO = "one gyro: there is nothing to fuse"
 
@@ -107,7 +107,7 @@ def run_all(opened: OpenArray, fused: Columns) -> list[Row]:
         if outcome.fused is not None:
             fused.add(outcome.column, outcome.fused.rate)
             if outcome.fused.sd is not None:
-                fused.add(SD.format(outcome.column), outcome.fused.sd.astype(np.float32, copy=False))
+                fused.add(DEVIATION.format(outcome.column), outcome.fused.sd.astype(np.float32, copy=False))
         return describe(outcome, opened)
 
     methods = select(opened.fusion.methods)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,13 +24,14 @@ from vgyro.metrics import (
     common_bandwidth,
     correlation_matrix,
     counted,
+    run_back,
     without_outliers,
 )
 from vgyro.metrics.dynamic_figures import dynamic_figures
-from vgyro.storage.tables import read_columns, read_metadata
+from vgyro.storage.tables import read_column, read_columns, read_metadata
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.measure_tables import Results, Rows, Series, write_results
-from vgyro.tasks.rates_file import ArrayFile, FileColumns, read_array
+from vgyro.tasks.rates_file import DEVIATION, ArrayFile, FileColumns, read_array
 
 FEWEST_SAMPLES = 3  # in the longest stretch, for an Allan deviation
 HEAD = ("time", "segment")
@@ -67,7 +68,7 @@ def main(task: Task) -> None:
     if reference is not None:
         columns, sampling = columns_of(series), frame.sampling(options.most_lost_s)
         moving = dynamic_figures(
-            columns, reference, frame.rate_hz, frame.segment, len(gyros), options, sampling=sampling
+            columns, reference, frame.rate_hz, frame.segment, len(gyros), options, sampling, deviations_of(series)
         )
         rows = with_dynamic(rows, Rows(series, moving, 0.0))
     if still is not None and still.true_rate == 0:
@@ -87,6 +88,18 @@ def columns_of(
     return FileColumns([(one.path, one.column) for one in series], where, less)
 
 
+def deviations_of(series: Sequence[Series]) -> Callable[[int], np.ndarray | None]:
+    """Place of a series → its posterior standard deviation [T], deg/s, read when it is asked for; None: it has none."""
+    names = {path: set(pq.read_schema(path).names) for path in {one.path for one in series}}
+
+    def of(place: int) -> np.ndarray | None:
+        one = series[place]
+        column = DEVIATION.format(one.column)
+        return read_column(one.path, column, float) if column in names[one.path] else None
+
+    return of
+
+
 def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]:
     """The columns of fused.parquet, by methods.parquet; a method that could not run has none."""
     found = []
@@ -94,7 +107,9 @@ def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]
         if column:
             bandwidth, gain = float(methods["bandwidth_hz"][row]), float(methods["dc_gain"][row])
             low_pass = LowPass(
-                bandwidth if math.isfinite(bandwidth) else None, gain if math.isfinite(gain) and gain > 0 else 1.0
+                bandwidth if math.isfinite(bandwidth) else None,
+                gain if math.isfinite(gain) and gain > 0 else 1.0,
+                int(methods["passes"][row]),
             )
             method, definition = str(methods["method"][row]), str(methods["definition"][row] or "")
             found.append(Series(fused, str(column), method, definition, low_pass))
@@ -122,9 +137,10 @@ def still_figures(
     if longest < FEWEST_SAMPLES:
         return None
     poses = task.options["kind"] == "free" and bool(sampling.stretch[-1] > 0)
-    bandwidth_hz = common_bandwidth([one.low_pass for one in series], options.equal_bandwidth_hz)
+    filters = [one.low_pass for one in series]
+    bandwidth_hz = common_bandwidth(filters, options.equal_bandwidth_hz)
     engine = task.options["analysis"].get("engine", "native")
-    shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses)
+    shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses, run_back(filters))
     columns = columns_of(series, where, less)
     try:
         measured = [shared.measure(values, one.low_pass) for values, one in zip(columns, series, strict=True)]

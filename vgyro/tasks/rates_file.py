@@ -14,6 +14,9 @@ from vgyro.errors import DataError
 from vgyro.metrics.sampling import Sampling
 from vgyro.storage.tables import read_batches, read_column, read_metadata
 
+DEVIATION = "sd_{}"
+"""Column of fused.parquet with the posterior standard deviation of another one."""
+
 
 @dataclass(frozen=True)
 class ArrayFile:
