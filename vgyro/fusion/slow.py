@@ -60,7 +60,7 @@ class SlowErrors:
     note: str
 
     def at_samples(self, values: np.ndarray) -> np.ndarray:
-        """Values [B] of the blocks at the samples [T]: linear between the blocks' middles, held at the ends of a stretch."""
+        """Values [B] of the blocks at the samples [T]: linear between their middles, held at the ends of a stretch."""
         result = np.empty(int(self.blocks.first[-1] + self.blocks.length[-1]))
         for samples, near in self.blocks.pieces(slice(0, len(result))):
             result[samples] = self.blocks.between(samples, near, values)
@@ -77,8 +77,8 @@ def slow_errors(
 ) -> SlowErrors:
     """Slow errors b_i(t) of the gyros, two-sided, so without delay, whatever the motion.
 
-    variance    : [N] or [B, N], (deg/s)² of a sample, such that variance/n is that of the mean of n samples: of coloured
-                  noise the long-run variance. A gyro whose variance is not finite or not above 0 is not used there
+    variance    : [N] or [B, N], (deg/s)² of a sample, such that variance/n is that of the mean of n samples: of
+                  coloured noise the long-run one. Where it is not finite or not above 0 the gyro is not used
     correlation : [N, N] of the noise; None: that of array.noise
     blocks      : SlowBlocks.of(array);  tune : multiply K by what the likelihood of the blocks prefers
     returns     : SlowErrors

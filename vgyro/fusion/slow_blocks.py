@@ -20,7 +20,7 @@ MOST_NUMBERS = 8_000_000
 class SlowBlocks:
     """Blocks of `size` samples in the gap-free stretches; what is left of a stretch is a shorter block.
 
-    first [B], first sample of each;  length [B], samples;  time [B] s, of the middle;  stretch [B], number of the stretch
+    first [B], first sample of each;  length [B], samples;  time [B] s, of the middle;  stretch [B], in which it lies
     Every sample lies in one block, and no block reaches over a gap.
     """
 
@@ -105,7 +105,7 @@ class SlowBlocks:
         return touched
 
     def jumps(self, array: ArrayRates) -> np.ndarray:
-        """Variance [B, N], (deg/s)², by which a bias may have changed when its gyro comes back from a drift or a step."""
+        """Variance [B, N], (deg/s)², by which a bias may have changed after a drift or a step of its gyro."""
         added = np.zeros((len(self), array.rate.shape[1]))
         for event in array.faults:
             back = int(np.searchsorted(self.first, event.stop, side="left"))

@@ -1,8 +1,8 @@
 """Model of the gyros' slow errors: what a block of samples says of them, and what is known beforehand.
 
-ȳ = 1·w̄ + b + n̄ in each block. Where the board may move w̄ is unknown: what is left is the parity, the differences between
-gyros, with the weight matrix G = R⁻¹ - R⁻¹11'R⁻¹/(1'R⁻¹1), G1 = 0. Where it stands still for certain (anchors) w̄ = 0 and
-G = R⁻¹. b = initial bias + temperature slope × (T - T̄) + random walk; the first two are constants, regressed on.
+ȳ = 1·w̄ + b + n̄ in each block. Where the board may move w̄ is unknown: what is left is the parity, the differences
+between gyros, with the weight matrix G = R⁻¹ - R⁻¹11'R⁻¹/(1'R⁻¹1), G1 = 0. Where it stands still for certain (anchors)
+w̄ = 0 and G = R⁻¹. b = initial bias + temperature slope × (T - T̄) + random walk; the first two are constants.
 """
 
 from __future__ import annotations
@@ -160,9 +160,9 @@ def empirical_prior(filtered: Filtered, gyros: int) -> np.ndarray:
 
     Initial biases: independent Student variables about 0 with ν degrees of freedom, as normal ones of the variance
     s²/λ_i: λ_i = (ν + 1)/(ν + E b_i²/s²), s² = mean λ_i·E b_i², again and again (an EM algorithm; E b_i² is that of the
-    posterior). What all of them share goes to the motion where nothing anchors it, so they are about their robust centre,
-    whose variance is 1/Σ(λ_i/s²). This understates it by the information of a Student location, (ν + 1)/(ν + 3) of that
-    of its weights: the variances are enlarged by the inverse.
+    posterior). What all share goes to the motion where nothing anchors it, so they are about their robust centre,
+    whose variance is 1/Σ(λ_i/s²). That is too small, for the information of a Student location is (ν + 1)/(ν + 3) of
+    that of its weights: the variances are enlarged by the inverse.
     Temperature slopes: independent normal variables of one variance.
     Lange, Little & Taylor (1989), J. Am. Stat. Assoc. 84, 881-896.
     """

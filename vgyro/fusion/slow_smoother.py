@@ -2,8 +2,8 @@
 
 State b [N], b_t = b_{t-1} + noise of covariance Q_t, b = 0 before the first step. A block of measurements is its
 information: y has the weight matrix G (singular where a part of b cannot be seen), and only G, Gy and y'Gy matter. The
-columns of y are the measurement itself and k regressors, so that one run serves for every value of their coefficients β:
-what is left of y is y_0 - Σ β_j·y_j, and the filter is linear.
+columns of y are the measurement itself and k regressors, so that one run serves for every value of their coefficients
+β: what is left of y is y_0 - Σ β_j·y_j, and the filter is linear.
 """
 
 from __future__ import annotations
