@@ -1,0 +1,172 @@
+"""Which model of the rate, with which parameters: by maximum likelihood and BIC."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from vgyro.config import MOTION_MODELS
+from vgyro.fusion.motion_evidence import Evidence, gather
+from vgyro.fusion.motion_models import Likelihood, Motion
+
+NO_GAIN = 0.01
+"""A motion that raises the log-likelihood by less is none."""
+GRID = 0.35
+"""Step of the first search over the frequency at which rate and noise are alike, decades."""
+TRIES = 150
+"""Evaluations of the likelihood of one search over several parameters."""
+HIGHEST_DAMPING = 20.0
+
+Parameters = dict[str, float]
+
+
+def choose_motion(
+    z: np.ndarray,
+    r: float | np.ndarray,
+    segment: np.ndarray,
+    rate_hz: float,
+    phi: float = 0.0,
+    models: Sequence[str] = MOTION_MODELS,
+    engine: str = "native",
+    moving: np.ndarray | None = None,
+) -> Motion:
+    """The model of the rate with the smallest BIC, each with the parameters of its greatest likelihood.
+
+    z, r, segment, rate_hz, phi : as in vgyro.fusion.smoother.smooth;  moving : [T] bool, only these samples count
+    models : names of those to choose from
+    Of more than 2^15 samples, four windows of 2^13 samples spread over the recording are used, and means of blocks of
+    the whole of it, about 2^14, whose model is exact (but for the correlation of coloured noise between blocks); their
+    log-likelihoods are added. It is the likelihood given the first 16 samples of each stretch: no model pays for not
+    knowing where it starts. A constant rate is a legal answer: q = 0.
+    raises : DataError if the samples do not change, or if r is not above zero; TooShort
+    """
+    evidence = gather(z, r, segment, rate_hz, phi, engine, moving)
+    rows, counts = [], []
+    for model in models:
+        parameters = _FITS[model](evidence)
+        total, count = evidence.log_likelihood(model, parameters)
+        constant = model == "oscillator" and parameters["q"] == 0.0
+        rows.append(Likelihood(model, total, -2.0 * total + (len(parameters) - constant) * math.log(count), parameters))
+        counts.append(count)
+    best = int(np.argmin([row.bic for row in rows]))
+    return Motion(rows[best].model, rows[best].parameters, rate_hz, tuple(rows), counts[best])
+
+
+def _driven(model: str, order: int) -> Callable[[Evidence], Parameters]:
+    """Fit of a rate whose derivative of this order is white: a grid over the frequency f at which rate and noise have
+    the same density, q = N²·(2π·f)^(2·order), then Brent's search between its best neighbours."""
+
+    def fit(evidence: Evidence) -> Parameters:
+        from scipy.optimize import minimize_scalar
+
+        def parameters(log: float) -> Parameters:
+            return {"q": evidence.noise_density * (2.0 * math.pi * math.exp(log)) ** (2 * order)}
+
+        def cost(log: float) -> float:
+            return -evidence.log_likelihood(model, parameters(log))[0]
+
+        lowest, highest = math.log(0.03 / evidence.duration_s), math.log(evidence.rate_hz)
+        grid = np.linspace(lowest, highest, math.ceil((highest - lowest) / (GRID * math.log(10.0))) + 1)
+        costs = [cost(log) for log in grid.tolist()]
+        best = int(np.argmin(costs))
+        bounds = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)]))
+        found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+        still = -evidence.log_likelihood(model, {"q": 0.0})[0]
+        return {"q": 0.0} if still <= found.fun + NO_GAIN else parameters(float(found.x))
+
+    return fit
+
+
+def _markov(evidence: Evidence) -> Parameters:
+    """Starts at the random walk q = 2·sd²/τ with the variance that the rate has beside its noise."""
+    q = _FITS["random_walk"](evidence)["q"]
+    sd = math.sqrt(evidence.excess)
+    tau = 2.0 * sd**2 / q if q > 0 else 0.1 * evidence.duration_s
+    bounds = {"tau_s": (0.1 / evidence.rate_hz, 1e4 * evidence.duration_s), "sd": (1e-6 * sd, 1e6 * sd)}
+    return _search(evidence, "markov", [{"tau_s": tau, "sd": sd}], bounds, {})
+
+
+def _oscillator(evidence: Evidence) -> Parameters:
+    """Starts narrow at the highest line of the periodogram, and wide at the r.m.s. frequency of the rate; first about a
+    constant, then about a random walk, where that is worth its parameter."""
+    line, centre = _frequencies(evidence)
+    sd, half = math.sqrt(evidence.excess), 0.5 * evidence.rate_hz
+    bounds = {
+        "frequency_hz": (0.01 / evidence.duration_s, half),
+        "damping": (1e-9, HIGHEST_DAMPING),
+        "sd": (1e-6 * sd, 1e6 * sd),
+    }
+    starts = [{"frequency_hz": line, "damping": 0.02, "sd": sd}, {"frequency_hz": centre, "damping": 0.5, "sd": sd}]
+    constant = _search(evidence, "oscillator", starts, bounds, {"q": 0.0})
+    slow = evidence.noise_density * (2.0 * math.pi * min(0.1 * constant["frequency_hz"], 1.0)) ** 2
+    wanders = _search(evidence, "oscillator", [constant | {"q": slow}], bounds | {"q": (1e-12 * slow, 1e6 * slow)}, {})
+    gain = evidence.log_likelihood("oscillator", wanders)[0] - evidence.log_likelihood("oscillator", constant)[0]
+    samples = sum(len(one.z) for one in evidence.series)
+    return wanders if 2.0 * gain > math.log(samples) else constant
+
+
+def _search(
+    evidence: Evidence,
+    model: str,
+    starts: list[Parameters],
+    bounds: Mapping[str, tuple[float, float]],
+    fixed: Parameters,
+) -> Parameters:
+    """Greatest likelihood over the logarithms of the parameters, by Nelder & Mead from each start, then again from the
+    best place."""
+    from scipy.optimize import minimize
+
+    names = list(bounds)
+    lowest, highest = np.log(np.array([bounds[name] for name in names])).T
+
+    def parameters(logs: np.ndarray) -> Parameters:
+        return dict(zip(names, np.exp(np.clip(logs, lowest, highest)).tolist(), strict=True)) | fixed
+
+    def cost(logs: np.ndarray) -> float:
+        outside = float(np.sum(np.maximum(lowest - logs, 0.0) + np.maximum(logs - highest, 0.0)))
+        return -evidence.log_likelihood(model, parameters(logs))[0] + 1e3 * outside
+
+    def run(start: np.ndarray, size: float) -> tuple[float, np.ndarray]:
+        simplex = np.vstack([start, start + size * np.eye(len(start))])
+        options = {"initial_simplex": simplex, "maxfev": TRIES, "xatol": 1e-4, "fatol": NO_GAIN}
+        found = minimize(cost, start, method="Nelder-Mead", options=options)
+        return float(found.fun), found.x
+
+    logs = [np.clip(np.log([start[name] for name in names]), lowest, highest) for start in starts]
+    value, place = min((run(one, 0.7) for one in logs), key=_first)
+    again, other = run(place, -0.3)
+    return parameters(other if again < value else place)
+
+
+def _first(found: tuple[float, np.ndarray]) -> float:
+    return found[0]
+
+
+def _frequencies(evidence: Evidence) -> tuple[float, float]:
+    """Highest line of the periodograms, and r.m.s. frequency of what they have above the noise, Hz."""
+    best, moments = (0.0, 1.0 / evidence.duration_s), np.zeros(2)
+    for one in evidence.series:
+        told = np.isfinite(one.r)
+        mean = float(np.mean(one.z[told]))
+        window = np.hanning(len(one.z))
+        power = np.abs(np.fft.rfft(np.where(told, one.z - mean, 0.0) * window)) ** 2
+        frequency = np.fft.rfftfreq(len(one.z), one.size / evidence.rate_hz)
+        # Of white noise alone, and of the sum over a line of amplitude A, A²/4·(Σ window)²
+        noise = float(np.mean(one.r[told])) * float(np.sum(window**2))
+        power, frequency = np.maximum(power[1:-1] - 2.0 * noise, 0.0), frequency[1:-1]
+        moments += [float(np.sum(power * frequency**2)) / noise, float(np.sum(power)) / noise]
+        highest = int(np.argmax(power))
+        best = max(best, (float(power[highest]) / float(np.sum(window)) ** 2, float(frequency[highest])))
+    centre = math.sqrt(moments[0] / moments[1]) if moments[1] > 0 and moments[0] > 0 else best[1]
+    return best[1], centre
+
+
+_FITS: dict[str, Callable[[Evidence], Parameters]] = {
+    "random_walk": _driven("random_walk", 1),
+    "acceleration": _driven("acceleration", 2),
+    "jerk": _driven("jerk", 3),
+    "oscillator": _oscillator,
+    "markov": _markov,
+}

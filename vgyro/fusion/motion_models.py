@@ -1,0 +1,279 @@
+"""Models of the rate: how it moves from one sample to the next, and what the steady smoother lets through.
+
+All states are in deg/s: the k-th derivative of the rate is multiplied by the k-th power of the sample period. In closed
+form, from dx = A·x·dt + G·dβ: F = e^(A·T) and Q = q·∫ e^(A·s) G G' e^(A'·s) ds over one period.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vgyro.errors import DataError
+
+UNLIMITED = "none"
+"""The model of a rate of which the neighbours say nothing: no smoothing."""
+
+UNITS = {"q": "", "frequency_hz": " Hz", "damping": "", "sd": " deg/s", "tau_s": " s"}
+Q_UNITS = {"random_walk": " deg²/s³", "acceleration": " deg²/s⁵", "jerk": " deg²/s⁷", "oscillator": " deg²/s³"}
+HALF_POWER = math.sqrt(0.5)
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """How well a model fits: its greatest log-likelihood, -2·log L + (parameters)·ln(samples), and where it is."""
+
+    model: str
+    log_likelihood: float
+    bic: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A model of the rate with its parameters.
+
+    model      : random_walk, acceleration, jerk, oscillator, markov; none: no smoothing
+    parameters : q, deg²/s³, deg²/s⁵, deg²/s⁷ of the white noise that drives the rate, its first and second derivative;
+                 oscillator: frequency_hz, damping, sd (deg/s) of the oscillation, q of the random walk below it;
+                 markov: tau_s, sd (deg/s)
+    rate_hz    : of the samples
+    table      : the models that it was chosen from;  samples : how many they were compared on
+    """
+
+    model: str
+    parameters: Mapping[str, float]
+    rate_hz: float
+    table: tuple[Likelihood, ...] = ()
+    samples: int = 0
+
+    @property
+    def text(self) -> str:
+        if self.model == UNLIMITED:
+            return "no smoothing"
+        units = UNITS | {"q": Q_UNITS.get(self.model, "")}
+        values = ", ".join(f"{name} = {value:.4g}{units[name]}" for name, value in self.parameters.items())
+        return f"{self.model}: {values}"
+
+    def dynamics(self) -> Dynamics:
+        return dynamics(self.model, self.parameters, 1.0 / self.rate_hz)
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """Of n states: transition F and process Q [n, n], reads h [n] (the rate is h'x).
+
+    stationary : [n] variance of the states that have one; NaN: of a state that wanders, nothing is known before
+    order      : [n] which derivative of the rate the state is
+    """
+
+    transition: np.ndarray
+    process: np.ndarray
+    reads: np.ndarray
+    stationary: np.ndarray = field(repr=False)
+    order: np.ndarray = field(repr=False)
+
+    def of_blocks(self, size: int) -> Dynamics:
+        """Of the means of `size` samples, exactly: the last state is the mean of h'x over the block, and is read."""
+        states = len(self.reads)
+        step = np.zeros((states + 1, states + 1))
+        step[:states, :states], step[states, :states], step[states, states] = (
+            self.transition, self.reads @ self.transition, 1.0,
+        )  # fmt: skip
+        enters = np.vstack([np.eye(states), self.reads])
+        F, Q = _power(step, enters @ self.process @ enters.T, size)
+        F[:, states] = 0.0
+        scale = np.append(np.ones(states), 1.0 / size)
+        return Dynamics(
+            F * scale[:, None],
+            Q * np.outer(scale, scale),
+            np.eye(states + 1)[states],
+            np.append(self.stationary, 0.0),
+            np.append(self.order, 0),
+        )
+
+
+def _power(F: np.ndarray, Q: np.ndarray, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Transition and process of so many steps, by doubling."""
+    whole, drive = np.eye(len(F)), np.zeros_like(Q)
+    while steps:
+        if steps % 2:
+            whole, drive = F @ whole, F @ drive @ F.T + Q
+        F, Q = F @ F, F @ Q @ F.T + Q
+        steps //= 2
+    return whole, drive
+
+
+def dynamics(model: str, parameters: Mapping[str, float], period: float) -> Dynamics:
+    """Of a model with its parameters at a sample period T, s.
+
+    raises : DataError for a model that is not known
+    """
+    if model == "oscillator":
+        return _oscillator(**parameters, period=period)
+    if model == "markov":
+        return _markov(**parameters, period=period)
+    if model not in _DRIVEN:
+        raise DataError(
+            f"unknown motion model {model!r}", remedy=f"Known: {', '.join([*_DRIVEN, 'oscillator, markov'])}"
+        )
+    shape = _DRIVEN[model]
+    states = len(shape)
+    lags = np.subtract.outer(np.arange(states), np.arange(states)).T
+    F = np.array([[1.0 / math.factorial(lag) if lag >= 0 else 0.0 for lag in row] for row in lags.tolist()])
+    return Dynamics(
+        F,
+        parameters["q"] * period ** (2 * states - 1) * shape,
+        np.eye(states)[0],
+        np.full(states, math.nan),
+        np.arange(states),
+    )
+
+
+_DRIVEN = {
+    "random_walk": np.ones((1, 1)),
+    "acceleration": np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]),
+    "jerk": np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]]),
+}
+"""Models whose highest derivative is a random walk: Q in units of q·T^(2n-1)."""
+
+
+def _markov(tau_s: float, sd: float, period: float) -> Dynamics:
+    """First order about a mean that does not move: states deviation and mean."""
+    return Dynamics(
+        np.diag([math.exp(-period / tau_s), 1.0]),
+        np.diag([-(sd**2) * math.expm1(-2.0 * period / tau_s), 0.0]),
+        np.ones(2),
+        np.array([sd**2, math.nan]),
+        np.zeros(2, dtype=int),
+    )
+
+
+def _oscillator(frequency_hz: float, damping: float, sd: float, q: float, period: float) -> Dynamics:
+    """x'' + 2ζω·x' + ω²·x = white noise, of stationary s.d. `sd`, about a random walk: states level, x, x'·T."""
+    omega, scale = 2.0 * math.pi * frequency_hz, np.array([1.0, period])
+    stationary = sd**2 * np.array([1.0, (omega * period) ** 2])
+    rise, slope, stay = _impulse_response(np.array([period]), omega, damping)
+    F = np.array([[stay[0], rise[0] / period], [-(omega**2) * rise[0] * period, slope[0]]])
+    if damping * omega * period > 0.5:
+        Q = np.diag(stationary) - F * stationary @ F.T
+    else:
+        # The difference above would cancel; the integral of a square does not. Its integrand is smooth over a period.
+        nodes, weights = np.polynomial.legendre.leggauss(24)
+        rise, slope, _ = _impulse_response(0.5 * period * (nodes + 1.0), omega, damping)
+        rows = scale[:, None] * np.array([rise, slope])
+        Q = 4.0 * damping * omega**3 * sd**2 * 0.5 * period * (rows * weights) @ rows.T
+    whole, drive = np.eye(3), np.zeros((3, 3))
+    whole[1:, 1:], drive[1:, 1:], drive[0, 0] = F, Q, q * period
+    return Dynamics(whole, drive, np.array([1.0, 1.0, 0.0]), np.append(math.nan, stationary), np.array([0, 0, 1]))
+
+
+def _impulse_response(time: np.ndarray, omega: float, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of x'' + 2ζω·x' + ω²·x = 0 at times [T]: g with g(0) = 0, g'(0) = 1; g'; and the x with x(0) = 1, x'(0) = 0."""
+    decay = damping * omega
+    square = (decay**2 - omega**2) * time**2
+    root = np.sqrt(np.abs(square))
+    tiny = np.abs(square) < 1e-3
+    safe = np.where(tiny, 1.0, root)
+    cosine = np.where(square < 0, np.cos(root), np.cosh(np.minimum(root, 700.0)))
+    sine = np.where(square < 0, np.sin(root), np.sinh(np.minimum(root, 700.0))) / safe
+    series = 1.0 + square / 6.0 * (1.0 + square / 20.0 * (1.0 + square / 42.0 * (1.0 + square / 72.0)))
+    fade = np.exp(-decay * time)
+    sine = fade * time * np.where(tiny, series, sine)
+    return sine, fade * cosine - decay * sine, fade * cosine + decay * sine
+
+
+@dataclass(frozen=True)
+class SteadyGain:
+    """What the steady two-sided smoother lets through: G(f) = S(f)/(S(f) + S_v(f)), without delay.
+
+    r : variance of the noise, (deg/s)²;  phi : its AR(1) coefficient
+    Wiener's smoother, for which the two-sided Kalman smoother is far from the ends.
+    """
+
+    motion: Motion
+    r: float
+    phi: float = 0.0
+
+    def at(self, frequency: np.ndarray) -> np.ndarray:
+        """G [F] at frequencies [F] above 0, Hz."""
+        model = self.motion.dynamics()
+        turn = np.exp(2j * math.pi * np.asarray(frequency, dtype=float) / self.motion.rate_hz)
+        # A state that never changes is known from all the samples: it has no density.
+        moves = np.diagonal(model.process) > 0
+        if not moves.any():
+            return np.zeros(len(turn))
+        F, Q = (one[np.ix_(moves, moves)] for one in (model.transition, model.process))
+        system = turn[:, None, None] * np.eye(len(F)) - F.T
+        response = np.linalg.solve(system, np.broadcast_to(model.reads[moves][:, None], (len(turn), len(F), 1)))[..., 0]
+        signal = np.einsum("fi,ij,fj->f", response, Q, response.conj()).real
+        noise = self.r * (1.0 - self.phi**2) / np.abs(1.0 - self.phi / turn) ** 2
+        return signal / (signal + noise)
+
+    @property
+    def random_walk_ratio(self) -> float | None:
+        """Q/r of a random walk in white noise, whose gain has closed forms; None of any other."""
+        if self.motion.model != "random_walk" or self.phi:
+            return None
+        return self.motion.parameters["q"] / self.motion.rate_hz / self.r
+
+    def bandwidth_hz(self) -> float:
+        """Highest frequency at which G is √½ (-3 dB); NaN: it is above that up to half the sample rate; 0: never is."""
+        from scipy.optimize import brentq
+
+        ratio = self.random_walk_ratio
+        if ratio is not None:
+            square = 0.25 * ratio * (math.sqrt(2.0) - 1.0)
+            return self.motion.rate_hz / math.pi * math.asin(math.sqrt(square)) if square < 1.0 else math.nan
+        frequency = self._frequencies()
+        above = np.flatnonzero(self.at(frequency) >= HALF_POWER)
+        if above.size == 0:
+            return 0.0
+        last = int(above[-1])
+        if last == len(frequency) - 1:
+            return math.nan
+        edges = np.log(frequency[last : last + 2]).tolist()
+        return math.exp(brentq(lambda log: float(self.at(np.exp([log]))[0]) - HALF_POWER, *edges, xtol=1e-12))
+
+    def noise_bandwidth_hz(self) -> float:
+        """∫ G² df from 0 to half the sample rate: of white noise r, 2·(this)/rate_hz·r is left."""
+        ratio, half = self.random_walk_ratio, 0.5 * self.motion.rate_hz
+        if ratio is not None:
+            keep = random_walk_keep(ratio)
+            return half * (1.0 - keep) * (1.0 + keep**2) / (1.0 + keep) ** 3
+        frequency = self._frequencies()
+        gain = self.at(frequency)
+        return float(np.trapezoid(gain**2, frequency) + gain[0] ** 2 * frequency[0])
+
+    def _frequencies(self) -> np.ndarray:
+        """Dense where G changes: toward 0, and around the frequency of an oscillator."""
+        half = 0.5 * self.motion.rate_hz
+        frequency = half * np.logspace(-9.0, 0.0, 4000)
+        if self.motion.model == "oscillator":
+            own, near = self.motion.parameters["frequency_hz"], np.logspace(-9.0, -0.05, 1500)
+            frequency = np.unique(np.concatenate([frequency, own * (1.0 - near), [own], own * (1.0 + near)]))
+        return frequency[frequency <= half]
+
+
+def random_walk_keep(ratio: float) -> float:
+    """Pole a of the smoother of a random walk, its answer to an impulse is (1-a)/(1+a)·a^|k|; ratio : Q/r."""
+    # a + 1/a = 2 + Q/r; the smaller root, without cancellation
+    return 2.0 / (2.0 + ratio + math.sqrt(ratio * (4.0 + ratio)))
+
+
+def fixed_bandwidth(bandwidth_hz: float, r_mean: float, rate_hz: float) -> Motion:
+    """The random walk whose steady two-sided smoother has this -3 dB bandwidth at the sample rate, exactly.
+
+    G(f) = 1/(1 + (r/Q)·4·sin²(π·f/rate)) is √½ there: Q = r·4·sin²(π·f/rate)/(√2 - 1). Above 0.4 of the sample rate
+    nothing is smoothed.
+    r_mean : mean variance of the noise, (deg/s)²
+    """
+    if not (math.isfinite(bandwidth_hz) and bandwidth_hz > 0 and math.isfinite(r_mean) and r_mean > 0):
+        raise DataError(f"no smoother has the bandwidth {bandwidth_hz:g} Hz with the variance {r_mean:g} (deg/s)²")
+    if bandwidth_hz > 0.4 * rate_hz:
+        return Motion(UNLIMITED, {}, rate_hz)
+    Q = r_mean * 4.0 * math.sin(math.pi * bandwidth_hz / rate_hz) ** 2 / (math.sqrt(2.0) - 1.0)
+    return Motion("random_walk", {"q": Q * rate_hz}, rate_hz)

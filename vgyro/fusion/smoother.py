@@ -1,0 +1,165 @@
+"""The maximum-likelihood smoother: the rate given all samples of a gap-free stretch, by a model of how it moves.
+
+The measurement is one series z = w + v whose noise v has its own variance at each sample. What the sensor's pole does
+to the noise is in the model (AR(1)): the rate is smoothed as the sensor passes it, and no colour is taken for motion.
+Rauch, Tung & Striebel (1965), AIAA J. 3(8), 1445-1450; models by likelihood as in Harvey (1989), ch. 3-4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from vgyro import engine as engines
+from vgyro.engine.linear import StateSpace
+from vgyro.errors import DataError
+from vgyro.fusion.motion_choice import choose_motion
+from vgyro.fusion.motion_evidence import wide_start
+from vgyro.fusion.motion_models import UNLIMITED, Dynamics, Motion, SteadyGain, fixed_bandwidth
+
+__all__ = ["Smoothed", "choose_motion", "fixed_bandwidth", "smooth"]
+
+FREE = 1e8
+"""Process variance over that of the noise at which neighbours say nothing (1e-8 of the weight)."""
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A smoothed rate.
+
+    rate, variance     : [T], deg/s and (deg/s)², mean and variance given all samples of the gap-free stretch
+    bandwidth_hz       : -3 dB, of the steady smoother at the mean of r; NaN: not limited; 0: the rate does not move
+    noise_bandwidth_hz : noise-equivalent, one-sided, of the same; NaN: not limited
+    passes             : 2 where it is a first-order low-pass run forward and back, of this bandwidth in all; 0: it is not
+    parameters         : model and parameters, for people
+    """
+
+    rate: np.ndarray
+    variance: np.ndarray
+    motion: Motion
+    bandwidth_hz: float
+    noise_bandwidth_hz: float
+    passes: int
+    parameters: str
+
+
+def smooth(
+    z: np.ndarray,
+    r: float | np.ndarray,
+    segment: np.ndarray,
+    rate_hz: float,
+    motion: Motion,
+    phi: float = 0.0,
+    engine: str = "native",
+    at_rest: np.ndarray | None = None,
+    rest: Motion | None = None,
+) -> Smoothed:
+    """The rate given all samples of each gap-free stretch.
+
+    z       : [T] deg/s;  r : variance of its noise, (deg/s)², one or [T]; infinite: z says nothing at this sample
+    segment : [T], number of the gap-free stretch;  rate_hz : sample rate, Hz
+    motion  : how the rate moves;  phi : AR(1) coefficient of the noise, from one sample to the next, 0 ≤ phi < 1
+    at_rest, rest : samples [T] over which the rate is the random walk `rest` instead; what the motion has beside a rate
+              (derivative, oscillation) is at zero after them
+    raises  : EngineError for samples that cannot be used, DataError for parameters that do not fit
+    A stretch without any sample that says something is NaN, with infinite variance.
+    """
+    z, r = np.asarray(z, dtype=float), np.asarray(r, dtype=float)
+    _check(z, r, segment, rate_hz, motion, phi)
+    mean = mean_variance(r)
+    steady = SteadyGain(motion, mean, phi)
+    standing = at_rest is not None and rest is not None and bool(np.any(at_rest))
+    if motion.model == UNLIMITED and not standing:
+        variance = np.broadcast_to(r, z.shape).copy()
+        return Smoothed(z.copy(), variance, motion, math.nan, math.nan, 0, motion.text)
+    rate, variance = np.empty(len(z)), np.empty(len(z))
+    dynamics = _free(motion, mean).dynamics()
+    regimes = [dynamics.transition], [dynamics.process]
+    if standing and rest is not None:
+        F, Q = _at_rest(dynamics, motion, _free(rest, mean), mean / rate_hz * (1.0 + phi) / (1.0 - phi))
+        regimes = [dynamics.transition, F], [dynamics.process, Q]
+    F, Q = (np.stack(one) for one in regimes)
+    run = engines.get(engine).statespace.smooth
+    for part in stretches(segment):
+        own = r if r.ndim == 0 else r[part]
+        flags = at_rest[part] if standing and at_rest is not None else None
+        start = wide_start(z[part], own, dynamics)
+        if start is None:
+            rate[part], variance[part] = math.nan, math.inf
+            continue
+        model = StateSpace(F, Q, dynamics.reads, dynamics.reads, *start, pole=phi)
+        rate[part], variance[part] = run(z[part], own, model, flags)
+    low_pass = motion.model == "random_walk" and not phi and not standing and (r.ndim == 0 or bool(np.all(r == r[0])))
+    text = f"{motion.text}; at rest {rest.text}" if standing and rest is not None else motion.text
+    if phi:
+        text += f"; noise AR(1), {phi:.3g} a sample"
+    limits = (math.nan, math.nan) if motion.model == UNLIMITED else (steady.bandwidth_hz(), steady.noise_bandwidth_hz())
+    return Smoothed(rate, variance, motion, *limits, 2 if low_pass else 0, text)
+
+
+def mean_variance(r: np.ndarray) -> float:
+    """Mean of the finite values of r, one or [T]."""
+    return float(np.mean(r, where=np.isfinite(r)))
+
+
+def stretches(segment: np.ndarray) -> Iterator[slice]:
+    """The gap-free stretches, in order."""
+    borders = np.flatnonzero(np.diff(segment)) + 1
+    return (slice(start, stop) for start, stop in pairwise([0, *borders.tolist(), len(segment)]))
+
+
+def _check(z: np.ndarray, r: np.ndarray, segment: np.ndarray, rate_hz: float, motion: Motion, phi: float) -> None:
+    if z.ndim != 1 or len(z) == 0 or len(segment) != len(z) or r.shape not in ((), z.shape):
+        raise DataError(f"z {z.shape}, r {r.shape} and segment {np.shape(segment)} do not fit", remedy="give [T] each")
+    if not 0.0 <= phi < 1.0:
+        raise DataError(f"the noise cannot have the AR(1) coefficient {phi:g}", remedy="give 0 ≤ phi < 1")
+    if motion.rate_hz != rate_hz:
+        raise DataError(f"the motion model is of {motion.rate_hz:g} Hz, the samples of {rate_hz:g} Hz")
+    if not np.isfinite(r).any():
+        raise DataError("no sample says anything: every variance is infinite")
+
+
+def _free(motion: Motion, r_mean: float) -> Motion:
+    """Where nothing is to be smoothed, a random walk that is faster than any noise."""
+    if motion.model != UNLIMITED:
+        return motion
+    return Motion("random_walk", {"q": FREE * r_mean * motion.rate_hz}, motion.rate_hz)
+
+
+def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition and process of a step to a sample at rest, of the states of `motion`.
+
+    The rate as a whole goes on as the random walk `rest`; derivatives and oscillation end, and begin about zero with
+    what the filter of white noise of this density (deg²/s) knows of them while it moves.
+    """
+    if rest.model != "random_walk":
+        raise DataError(f"the rate at rest is a random walk, not {rest.model}")
+    states = len(dynamics.reads)
+    F, Q = np.eye(states), np.zeros((states, states))
+    Q[0, 0] = rest.parameters["q"] / rest.rate_hz
+    if motion.model in ("acceleration", "jerk", "oscillator"):
+        F[1:] = 0.0
+        F[0] = dynamics.reads
+        Q[1:, 1:] = np.diag(_known_derivatives(motion, dynamics, density)[1:])
+    return F, Q
+
+
+def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np.ndarray:
+    """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
+
+    With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero.
+    """
+    values = motion.parameters
+    if motion.model == "oscillator":
+        q = 4.0 * values["damping"] * (2.0 * math.pi * values["frequency_hz"]) ** 3 * values["sd"] ** 2
+        factors = np.array([0.0, 0.0, math.sqrt(2.0)])
+    else:
+        q = values["q"]
+        factors = np.array([2.0, 3.0, 2.0]) if motion.model == "jerk" else np.full(2, math.sqrt(2.0))
+    w = (q / density) ** (1.0 / (6.0 if motion.model == "jerk" else 4.0))
+    order = dynamics.order
+    return density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)
