@@ -26,6 +26,7 @@ from vgyro.fusion.weights import min_variance_weights
 
 FEWEST_BLOCKS = 16
 PASSES = 3
+SETTLING = 10
 SMALLEST_EIGENVALUE = 1e-3
 """A correlation matrix with a smaller one is too near to singular to weight by."""
 
@@ -119,7 +120,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
         variance, memories = _changing(moments, constant, outlier, correlation, block_s, low_pass)
     tau = np.array([memory.tau_s for memory in memories])
     changes = np.array([len(memory.points) for memory in memories])
-    phi = colour(array, moments)
+    phi = colour(array, moments, constant)
     note = _note(moments, correlation, gyros)
     return Variances(
         moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note
@@ -147,20 +148,41 @@ def _changing(
     known = ~moments.excluded & ((~moments.excluded).sum(axis=1) > 1)[:, None]
     memories: list[Memory] = []
     variance = alone
-    for number in range(PASSES):
+    for _ in range(PASSES):
         square = _squares(moments, alone, known & ~outlier, correlation)
+        square = _settled(moments, square, alone, outlier | outliers(np.where(known, square, 0.0)), correlation)
         outlier = outliers(np.where(known, square, 0.0))
         freedom = np.where(known & ~outlier, moments.size[:, None].astype(float), 0.0)
         columns = list(zip(square.T, freedom.T, strict=True))
-        if number < PASSES - 1:
-            memories = [chosen_memory(*one, block_s, low_pass) for one in columns]
+        memories = [chosen_memory(*one, block_s, low_pass) for one in columns]
         found = [memory.average(*one, low_pass) for memory, one in zip(memories, columns, strict=True)]
         variance, alone = (np.column_stack([one[place] for one in found]) for place in (0, 1))
-        least = LEAST_SHARE * float(np.median(constant))
         # An outlier has the variance that it shows, and lends it to no other block.
-        shown = np.where(outlier, square, 0.0)
-        variance, alone = np.maximum(np.maximum(variance, shown), least), np.maximum(np.maximum(alone, shown), least)
+        least = np.maximum(LEAST_SHARE * float(np.median(constant)), np.where(outlier, square, 0.0))
+        variance, alone = (np.where(known.any(axis=0), one, constant) for one in (variance, alone))
+        variance, alone = np.maximum(variance, least), np.maximum(alone, least)
     return variance, memories
+
+
+def _settled(
+    moments: BlockMoments, square: np.ndarray, variance: np.ndarray, outlier: np.ndarray, correlation: np.ndarray
+) -> np.ndarray:
+    """`square` [M, N] with the blocks of outliers put right: there each gyro's variance is the block's own.
+
+    An outlier moves the estimate that it is measured against, so that all the other gyros look far off as well. With
+    its own square as its variance, but not less than the `variance` of before, it loses its weight within a few rounds.
+    """
+    rows = np.flatnonzero(outlier.any(axis=1))
+    if len(rows) == 0:
+        return square
+    part = moments.part(rows)
+    found, least = square[rows], variance[rows]
+    for _ in range(SETTLING):
+        best = best_weights(np.maximum(found, least), part.excluded, correlation)
+        found = part.residual(best.weights)[0] + best.variance[:, None]
+    square = square.copy()
+    square[rows] = found
+    return square
 
 
 def _squares(moments: BlockMoments, variance: np.ndarray, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Second moments of the differences between the gyros, in fine blocks: all that the parity variances need of the samples.
+"""Second moments of the differences between the gyros in fine blocks: all that parity needs of the samples.
 
 A residual y - 1·u'y with weights u that are constant within a block has the second moment A·S·A', A = I - 1u', whatever
 u is: so the samples are read once, and every iteration runs over blocks. The motion cancels in S.
@@ -7,7 +7,7 @@ u is: so the samples are read once, and every iteration runs over blocks. The mo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -23,7 +23,9 @@ SINGLE_BELOW_HZ = 8.0
 SLOW_BLOCKS = 32
 """The slow part of a residual is its mean over so many blocks on either side of its own."""
 STUCK_SAMPLES = 16
-"""A gyro that repeats one value so often is stuck."""
+STUCK_SHARE = 1e-3
+"""A gyro is stuck where its steps from sample to sample have, over so many samples, less than this share of the square
+that they have in the median of the gyros. Noise that small is of a gyro that does not measure, not of a perfect one."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,10 @@ class BlockMoments:
         """Samples of each block [M]."""
         return self.stop - self.start
 
+    def part(self, blocks: np.ndarray) -> BlockMoments:
+        """Some of the blocks, by number; their windows are still those of all."""
+        return BlockMoments(*(getattr(self, one.name)[blocks] for one in fields(self)))
+
     def window_sum(self, values: np.ndarray) -> np.ndarray:
         """Sums of values [M, ...] over the window about each block."""
         total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
@@ -70,21 +76,18 @@ def block_moments(array: ArrayRates) -> BlockMoments:
     gyros = array.rate.shape[1]
     square = np.empty((len(start), gyros, gyros))
     mean = np.empty((len(start), gyros))
-    still = np.empty((len(start), gyros), dtype=bool)
-    first_of_stretch = np.array([part.start for part in array.stretches()])
+    step = np.empty((len(start), gyros))
     for blocks in _pieces(start, stop):
         rows = slice(int(start[blocks.start]), int(stop[blocks.stop - 1]))
         begin = start[blocks] - rows.start
         values = np.array(array.rate[rows].T, dtype=float, order="C")
-        still[blocks] = _unchanged(values, array.rate[rows.start - 1] if rows.start else None, begin)
+        step[blocks] = _steps(values, array.rate[rows.start - 1] if rows.start else values[:, 0], begin)
         values -= values.mean(axis=0)
         mean[blocks] = (_sums(values, begin) / (stop[blocks] - start[blocks])).T
         for one in range(gyros):
             for other in range(one + 1):
                 square[blocks, one, other] = square[blocks, other, one] = _sums(values[one] * values[other], begin)
-    # The first sample of a stretch repeats nothing.
-    still[(stop - start == 1) & np.isin(start, first_of_stretch)] = False
-    bad = _stuck(still, start, stop)
+    bad = _stuck(step, stop - start)
     _mark(bad, start, stop, excluded(array.faults, len(array.rate), gyros))
     return BlockMoments(start, stop, low, high, square, mean, bad)
 
@@ -125,25 +128,24 @@ def _sums(values: np.ndarray, begin: np.ndarray) -> np.ndarray:
     return values if len(begin) == values.shape[-1] else np.add.reduceat(values, begin, axis=-1)
 
 
-def _unchanged(values: np.ndarray, before: np.ndarray | None, begin: np.ndarray) -> np.ndarray:
-    """[B, N]: every sample of the block repeats the one before it; of values [N, n] after the sample `before`."""
-    change = np.empty(values.shape, dtype=np.int32)
-    change[:, 1:] = values[:, 1:] != values[:, :-1]
-    change[:, 0] = 0 if before is None else values[:, 0] != before
-    # In a block of several samples the first may be the one that is then repeated.
-    change[:, begin[np.diff(begin, append=values.shape[1]) > 1]] = 0
-    return (_sums(change, begin) == 0).T
+def _steps(values: np.ndarray, before: np.ndarray, begin: np.ndarray) -> np.ndarray:
+    """Sums of the squared steps [B, N] of values [N, n] in each block; the first step is from `before` [N]."""
+    steps = np.diff(values, axis=1, prepend=np.asarray(before, dtype=float)[:, None])
+    return _sums(steps * steps, begin).T
 
 
-def _stuck(still: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
-    """[M, N]: blocks in runs of unchanged ones with STUCK_SAMPLES or more samples."""
-    stuck = np.zeros_like(still)
-    for gyro, column in enumerate(still.T):
-        if not column.any():
-            continue
-        edge = np.flatnonzero(np.diff(np.concatenate([[0], column.astype(np.int8), [0]])))
-        for first, last in edge.reshape(-1, 2):
-            stuck[first:last, gyro] = stop[last - 1] - start[first] >= STUCK_SAMPLES
+def _stuck(step: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """[M, N]: blocks that lie in STUCK_SAMPLES samples with hardly a step; squared steps [M, N], samples [M]."""
+    stuck = np.zeros(step.shape, dtype=bool)
+    blocks = STUCK_SAMPLES if int(np.median(size)) == 1 else 1
+    windows = len(step) - blocks + 1
+    if windows < 1:
+        return stuck
+    over, samples = (sum(one[shift : shift + windows] for shift in range(blocks)) for one in (step, size))
+    small = over <= STUCK_SHARE * np.median(over, axis=1, keepdims=True)
+    small &= (samples >= STUCK_SAMPLES)[:, None]
+    for shift in range(blocks):
+        stuck[shift : shift + windows] |= small
     return stuck
 
 

@@ -8,56 +8,69 @@ import numpy as np
 
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.parity_blocks import BlockMoments
-from vgyro.fusion.parity_hat import pair_variances
+from vgyro.fusion.parity_hat import pair_variances, patterns
 
 PARTS = 24
+FEWEST_PARTS = 4
 PART_SAMPLES = 1 << 16
 FEWEST_SAMPLES = 32
 """Samples of a part, at least."""
 SIGNIFICANT = 3.0
+MOST_WEIGHT = 0.5
 LARGEST = 0.999
 
 
-def colour(array: ArrayRates, moments: BlockMoments) -> np.ndarray:
+def colour(array: ArrayRates, moments: BlockMoments, variance: np.ndarray) -> np.ndarray:
     """φ [N] of each gyro's noise, an AR(1) process: its lag-1 autocovariance over its variance.
 
-    From up to 24 parts of the recording, without their slow part. For two gyros i, j the differences have the lag-k
-    autocovariance γ_i(k) + γ_j(k); least squares over all pairs gives each γ_i, and the differences between the parts
-    the standard error of φ. 0 where it is not positive by 3 of these, or cannot be told (two gyros: of both together).
+    variance [N] : (deg/s)², about that of the noise
+    From up to 24 parts of the recording, without their slow part. The residual e = A·y, A = I - 1u', has the lag-k
+    autocovariances (A∘A)·γ(k) of γ_i(k), those of the gyros: a linear system; the jackknife over the parts has the
+    standard error of φ. 0 where φ is not positive by 3 of these. Two gyros: of both together.
     """
-    gyros = array.rate.shape[1]
-    found = np.array(list(_parts(array, moments)))
-    if len(found) < 4:
-        return np.zeros(gyros)
-    still, moved = (np.array([_shares(found[:, lag].sum(axis=0))]) for lag in (0, 1))
+    phi = np.zeros(array.rate.shape[1])
+    excluded, good = max(patterns(moments.excluded), key=lambda one: len(one[1]))
+    kept = np.flatnonzero(~excluded)
+    weights = _weights(variance[kept])
+    found = np.array(list(_parts(array, moments, good, kept)))
+    if len(found) < FEWEST_PARTS or len(kept) < 2:
+        return phi
     # Each part left out in turn: the jackknife.
     totals = found.sum(axis=0) - found
-    each = np.array([_ratio(_shares(lag0), _shares(lag1)) for lag0, lag1 in totals])
+    each = np.array([_ratio(*_shares(one, weights)) for one in totals])
     error = np.sqrt((len(each) - 1) * each.var(axis=0))
-    phi = _ratio(still[0], moved[0])
-    return np.where(phi > SIGNIFICANT * error, np.clip(phi, 0.0, LARGEST), 0.0)
+    mean = _ratio(*_shares(found.sum(axis=0), weights))
+    phi[kept] = np.where(mean > SIGNIFICANT * error, np.clip(mean, 0.0, LARGEST), 0.0)
+    return phi
 
 
 def _ratio(variance: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     return np.where(variance > 0, covariance / np.where(variance > 0, variance, 1.0), 0.0)
 
 
-def _shares(square: np.ndarray) -> np.ndarray:
-    """Each gyro's part [N] of the second moments [N, N] of the differences: the N-cornered hat, of either sign."""
-    gyros = len(square)
-    pairs = pair_variances(square)
-    total = pairs.sum(axis=1)
+def _weights(variance: np.ndarray) -> np.ndarray:
+    """Weights [N] of the first-pass rate, ∝ 1/variance, none above a half: a gyro's residual must show the gyro."""
+    weights = 1.0 / variance / np.sum(1.0 / variance)
+    small = weights < MOST_WEIGHT
+    kept = np.minimum(weights, MOST_WEIGHT)
+    return kept + (1.0 - kept.sum()) * small / max(int(small.sum()), 1)
+
+
+def _shares(square: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The gyros' own autocovariances [2, N] of lag 0 and 1 from the second moments [2, N, N] of the differences."""
+    gyros = len(weights)
     if gyros == 2:
-        return total / 2.0
-    return (total - total.sum() / (2.0 * (gyros - 1))) / (gyros - 2)
+        return np.repeat(pair_variances(square)[:, 0, 1:] / 2.0, 2, axis=1)
+    A = np.eye(gyros) - weights
+    return np.linalg.solve(A**2, np.einsum("ij,ljk,ik->il", A, square, A)).T
 
 
-def _parts(array: ArrayRates, moments: BlockMoments) -> Iterator[np.ndarray]:
-    """Second moments [2, N, N] of each part, of lag 0 and 1: Σ dd' and Σ (d_t d_{t+1}' + d_{t+1} d_t')/2."""
-    good = ~moments.excluded.any(axis=1)
-    edges = np.unique(np.linspace(0, len(good), PARTS + 1).astype(np.int64))
-    for begin, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        blocks = np.flatnonzero(good[begin:end]) + begin
+def _parts(array: ArrayRates, moments: BlockMoments, good: np.ndarray, kept: np.ndarray) -> Iterator[np.ndarray]:
+    """Second moments [2, K, K] of each part, of lag 0 and 1: Σ dd' and Σ (d_t d_{t+1}' + d_{t+1} d_t')/2.
+
+    good : numbers of the blocks to use, in order;  kept [K] : the gyros
+    """
+    for blocks in np.array_split(good, PARTS):
         if len(blocks) == 0:
             continue
         # One run of blocks, so that each sample but its last has a next one.
@@ -66,15 +79,18 @@ def _parts(array: ArrayRates, moments: BlockMoments) -> Iterator[np.ndarray]:
         first = int(moments.start[longest[0]])
         last = min(int(moments.stop[longest[-1]]), first + PART_SAMPLES)
         if last - first >= FEWEST_SAMPLES:
-            yield _of_part(array, moments, slice(first, last))
+            yield _of_part(array, moments, slice(first, last), kept)
 
 
-def _of_part(array: ArrayRates, moments: BlockMoments, rows: slice) -> np.ndarray:
+def _of_part(array: ArrayRates, moments: BlockMoments, rows: slice, kept: np.ndarray) -> np.ndarray:
     values = np.array(array.rate[rows].T, dtype=float, order="C")
     values -= values.mean(axis=0)
+    values = values[kept]
     block = np.searchsorted(moments.stop, np.arange(rows.start, rows.stop), side="right")
     near = slice(int(block[0]), int(block[-1]) + 1)
-    total = np.concatenate([np.zeros((1, len(values))), np.cumsum(moments.mean * moments.size[:, None], axis=0)])
+    total = np.concatenate(
+        [np.zeros((1, len(values))), np.cumsum(moments.mean[:, kept] * moments.size[:, None], axis=0)]
+    )
     high, low = moments.high[near] + 1, moments.low[near]
     count = np.concatenate([[0], np.cumsum(moments.size)])
     number = (count[high] - count[low])[:, None]

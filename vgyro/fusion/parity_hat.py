@@ -2,9 +2,9 @@
 
 Model: y = 1·w + n, w unknown and of any size, n of covariance R = σσ'∘C. The differences have no w in them. With the
 minimum-variance weights u = R⁻¹1/(1'R⁻¹1) and r = u'Ru = 1/(1'R⁻¹1) the residual e = y - 1·u'y has the covariance
-R - r·11': so e_i² + r is without bias for σ_i² where u is that of R. Repeating this is the EM algorithm (Dempster,
-Laird & Rubin 1977, J. R. Stat. Soc. B 39, 1-38) for w without prior and C = I, so it climbs the likelihood of the
-parity space and no variance becomes negative.
+R - r·11': so e_i² + r is without bias for σ_i² where u is that of R. For C = I repeating this is the EM algorithm
+(Dempster, Laird & Rubin 1977, J. R. Stat. Soc. B 39, 1-38) with w as what is missing: it climbs the likelihood of the
+parity space, and no variance becomes negative.
 A common term of all gyros, R + c·11', is in no difference: only the part of C orthogonal to it can be seen.
 """
 
@@ -19,7 +19,7 @@ from vgyro.fusion.parity_blocks import BlockMoments
 ROUNDS = 200
 CONVERGED = 1e-7
 LEAST_SHARE = 1e-3
-"""Least variance, as a share of the median over the gyros: what is below is a gyro that does not measure."""
+"""Least variance, as a share of the median over the gyros."""
 START_SHARE = 0.02
 FAR = 16.0
 """A block whose square is so many times the largest of the eight blocks about it is an outlier."""
@@ -95,16 +95,15 @@ def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[
 
     The slow part (drift, bias) is left out, and so are the blocks that are excluded, or where one gyro is an outlier.
     """
-    square = _without_slow(moments)
     outlier = np.zeros(moments.excluded.shape, dtype=bool)
-    variance = _solve(moments, square, np.ones(len(square), dtype=bool), correlation)
+    variance = _solve(moments, ~outlier.any(axis=1), correlation)
     for _ in range(2):
         best = best_weights(np.broadcast_to(variance, outlier.shape), moments.excluded, correlation)
         mean_square = moments.residual(best.weights)[0] + best.variance[:, None]
         outlier = outliers(np.where(moments.excluded, 0.0, mean_square))
         if not outlier.any():
             break
-        variance = _solve(moments, square, ~outlier.any(axis=1), correlation)
+        variance = _solve(moments, ~outlier.any(axis=1), correlation)
     return variance, outlier
 
 
@@ -117,10 +116,13 @@ def outliers(square: np.ndarray) -> np.ndarray:
     return (around > 0) & (square > FAR * around)
 
 
-def _without_slow(moments: BlockMoments) -> np.ndarray:
-    """Second moments [M, N, N] a sample of the differences less their slow part; without bias for constant variances."""
-    count = (moments.high - moments.low + 1)[:, None]
-    slow = moments.window_sum(moments.mean) / count
+def _without_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
+    """Second moments [M, N, N] a sample of the differences less their slow part, without bias for constant variances.
+
+    used [M] : the blocks that the slow part is the mean of
+    """
+    count = np.maximum(moments.window_sum(used.astype(float)), 1.0)[:, None]
+    slow = moments.window_sum(np.where(used[:, None], moments.mean, 0.0)) / count
     cross = moments.mean[:, :, None] * slow[:, None, :]
     size = moments.size[:, None, None]
     less = moments.square - size * (cross + cross.transpose(0, 2, 1) - slow[:, :, None] * slow[:, None, :])
@@ -128,8 +130,9 @@ def _without_slow(moments: BlockMoments) -> np.ndarray:
     return less / np.maximum(size - 1.0 / count[:, :, None], 0.5)
 
 
-def _solve(moments: BlockMoments, square: np.ndarray, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
-    """Variances [N] of the greatest likelihood of the parity space, from the N-cornered hat on."""
+def _solve(moments: BlockMoments, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
+    """Variances [N] of the greatest likelihood of the parity space, from the N-cornered hat on; blocks `used` [M]."""
+    square = _without_slow(moments, used)
     totals, counts, kept = [], [], []
     for pattern, rows in patterns(moments.excluded):
         mine = rows[used[rows]]
@@ -156,15 +159,19 @@ def _solve(moments: BlockMoments, square: np.ndarray, used: np.ndarray, correlat
 def _climb(
     variance: np.ndarray, square: np.ndarray, count: np.ndarray, kept: np.ndarray, correlation: np.ndarray
 ) -> np.ndarray:
-    """Repeat σ_i² ← mean of e_i² + r; square [P, N, N], count [P], kept [P, N] of P patterns of good gyros."""
+    """Climb the likelihood; square [P, N, N], count [P], kept [P, N] of P patterns of good gyros.
+
+    σ_i² ← σ_i²·√(mean e_i²/mean(σ_i² - r)) has the fixed points of EM, and is faster where a variance is near zero
+    (Zhou, Hu, Qiao & Lange 2019, J. Comput. Graph. Stat. 28, 350-361).
+    """
     share = kept * count[:, None]
-    mass = share.sum(axis=0)
-    for _ in range(ROUNDS if len(variance) > 2 else 1):
+    for _ in range(ROUNDS):
         best = best_weights(np.broadcast_to(variance, kept.shape), ~kept, correlation)
         cross = np.einsum("pij,pj->pi", square, best.weights)
         residual = np.einsum("pii->pi", square) - 2.0 * cross + np.sum(cross * best.weights, axis=1, keepdims=True)
-        found = ((residual + best.variance[:, None]) * share).sum(axis=0) / np.where(mass > 0, mass, 1.0)
-        found = np.where(mass > 0, found, variance)
+        seen, expected = ((one * share).sum(axis=0) for one in (residual, variance - best.variance[:, None]))
+        known = expected > 0
+        found = variance * np.sqrt(np.where(known, seen, 1.0) / np.where(known, expected, 1.0))
         found = np.maximum(found, LEAST_SHARE * np.median(found))
         close = np.allclose(found, variance, rtol=CONVERGED, atol=0.0)
         variance = found

@@ -65,12 +65,14 @@ def chosen_memory(square: np.ndarray, freedom: np.ndarray, block_s: float, low_p
     """The memory that predicts each block best from the others.
 
     square [M] : of expectation σ²;  freedom [M] : samples of each block; 0: left out;  block_s : s from block to block
-    Score: the Gaussian deviance Σ ν·(x/v + log v) with v from the other blocks alone (QLIKE, Patton 2011, J. Econometrics
-    160, 246-256). Beside a constant variance, anything pays 2·log(Σν) for its time constant, and log M for each change
-    point, whose place the block itself had a say in.
+    Score: the Gaussian deviance Σ ν·(x/v + log v) with v from the other blocks alone (QLIKE, Patton 2011, J.
+    Econometrics 160, 246-256). Beside a constant variance, anything pays 2·log(Σν) for its time constant, and log M for
+    each change point, whose place the block itself had a say in.
     """
-    scaled = freedom * effective_share(square, freedom)
     none = np.empty(0, dtype=np.int64)
+    if not freedom.any():
+        return Memory(none, 1.0, math.inf)
+    scaled = freedom * effective_share(square, freedom)
     points = change_points(square, scaled)
     bases = [none, points] if len(points) else [none]
     best, least = Memory(none, 1.0, math.inf), math.inf

@@ -15,12 +15,12 @@ def parity_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """Fixed minimum-variance weights from the constant variances of the parity space.
 
     They hold in motion, where no gyro's own scatter is its noise. Faults that were found have no say: a gyro is left
-    out only where it is stuck all the time. A gyro that drifts is not known by its drift, but by its noise.
+    out only where it is stuck half of the time or more. A gyro that drifts is not known by its drift, but by its noise.
     """
     found = parity_variances(replace(array, faults=()), parameters, changing=False)
-    never = found.excluded.all(axis=0)
+    stuck = found.shares @ found.excluded >= 0.5 * len(array.rate)
     once = replace(
-        found, start=found.start[:1], stop=found.stop[:1], variance=found.variance[:1], excluded=never[None]
+        found, start=found.start[:1], stop=found.stop[:1], variance=found.variance[:1], excluded=stuck[None]
     )  # fmt: skip
     weights = once.weights(parameters.engine)[0]
     return Fused.undelayed(combined(array.rate, weights), weights, found.note)
