@@ -91,7 +91,7 @@ class Steady:
         """-3 dB bandwidth, Hz, NaN where there is none: |w/y|² = 1/2 is quadratic in v = 1 - cos(2πfT)."""
         a, b = self.alpha, self.beta
         square, linear = 4.0 * (1.0 - a), -2.0 * a * a + 6.0 * a * b - 4.0 * b
-        v = (-linear + math.sqrt(linear**2 + 4.0 * square * b * b)) / (2.0 * square)
+        v = 2.0 * b * b / (linear + math.sqrt(linear**2 + 4.0 * square * b * b))
         return math.nan if v > 2.0 else 2.0 * math.asin(math.sqrt(v / 2.0)) / (2.0 * math.pi * self.period)
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 
 from vgyro.board import BinaryFrame, parse_board
 from vgyro.engine.frames import Column
-from vgyro.engine.native import allan, dcc, frames, garch, kalman, weights
+from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, weights
 
 BOARDS = Path(__file__).parents[3] / "config/boards"
 SEED = 20150612
@@ -71,6 +71,17 @@ def results() -> dict[str, object]:
     estimate, variance = kalman.kalman_filter(rate, 0.99, 0.01, noise, 0.0, 1.0)
     found["kalman"] = (estimate, variance)
     found["rts"] = kalman.rts_smoother(estimate, variance, 0.99, 0.01)
+    for size in (2, 3, 4, 5, 6, 9):
+        several, states = covariances(rng, 3, size), np.eye(2 + 2 * size)
+        drive = 1e-3 * np.array([[3e-8, 1e-5], [1e-5, 5e-3]])
+        some = rate[:, rng.integers(0, GYROS, size)] + 1e-3 * rng.normal(size=(3001, size))
+        found[f"adaptive {size}"] = adaptive.scale_bias_filter(
+            some, 0.005, several[0], drive, np.full(size, 1e-6), states[0], states
+        )
+        for steps in (1, 3, 4, 5):
+            found[f"adaptive bank {size} {steps}"] = adaptive.filter_bank(
+                some, several, np.geomspace(1e-6, 1e2, steps), 0.0, 1e4, np.full((3, steps), 1 / (3 * steps)), 1e-4
+            )
     factors = np.unique(np.geomspace(1, 1000, 20).astype(np.int64))
     found["allan"] = allan.differences(rate[:, 0].copy(), factors)
     found["allan 3"] = allan.differences(rate[:3, 0].copy(), np.array([1]))
