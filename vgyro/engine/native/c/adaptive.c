@@ -7,8 +7,6 @@ typedef uint64_t u4 __attribute__((vector_size(32)));
 /* Vectors that hold `count` numbers. */
 VG_INLINE ptrdiff_t vectors(ptrdiff_t count) { return (count + VG_LANES - 1) / VG_LANES; }
 
-VG_INLINE double v4_sum(v4 x) { return (x[0] + x[1]) + (x[2] + x[3]); }
-
 /* Number `column` of a row, in rows of `wide` vectors. */
 #define VG_AT(rows, wide, row, column) ((rows)[(row) * (wide) + (column) / VG_LANES][(column) % VG_LANES])
 

@@ -1,5 +1,7 @@
 /* The extended Kalman filter, and the bank of filters: one sample after the other, the states (the members) in lockstep. */
 
+VG_INLINE double VG(adaptive_sum)(v4 x) { return (x[0] + x[1]) + (x[2] + x[3]); }
+
 /* Where the parts of the filter lie; rows of `wide` vectors, padded with zeros. */
 typedef struct {
     v4 *covariance; /* [2N] rows */
@@ -86,8 +88,8 @@ VG_INLINE void VG(adaptive_update)(const vg_adaptive_array *m, VG(adaptive_parts
         spread += h[k] * g[k];
         told += h[k] * change[k];
     }
-    const double root = 1.0 / sqrt(1.0 + v4_sum(spread));
-    const v4 roots = v4_set(root), size = v4_set((left - v4_sum(told)) * root);
+    const double root = 1.0 / sqrt(1.0 + VG(adaptive_sum)(spread));
+    const v4 roots = v4_set(root), size = v4_set((left - VG(adaptive_sum)(told)) * root);
     for (ptrdiff_t k = 0; k < wide; k++) {
         g[k] *= roots;
         change[k] += g[k] * size;
@@ -194,20 +196,20 @@ VG_INLINE void VG(adaptive_bank)(const vg_adaptive_bank *m, const double *rate, 
             p[g] *= VG(adaptive_exp)(half * (distance[g] - v4_set(lowest)));
             sum += p[g];
         }
-        v4 inverse = v4_set(1.0 / v4_sum(sum));
+        v4 inverse = v4_set(1.0 / VG(adaptive_sum)(sum));
         sum = v4_set(0.0);
         for (ptrdiff_t g = 0; g < groups; g++) {
             p[g] = v4_max(p[g] * inverse, least[g]);
             sum += p[g];
         }
-        inverse = v4_set(1.0 / v4_sum(sum));
+        inverse = v4_set(1.0 / VG(adaptive_sum)(sum));
         sum = v4_set(0.0);
         for (ptrdiff_t g = 0; g < groups; g++) {
             p[g] *= inverse;
             total[g] += p[g];
             sum += p[g] * x[g];
         }
-        estimate[t] = v4_sum(sum);
+        estimate[t] = VG(adaptive_sum)(sum);
     }
 }
 
