@@ -18,6 +18,7 @@ from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_choice import Choice, Walk, choose
 from vgyro.fusion.slow_model import Constants, Evidence, empirical_prior, posterior
 from vgyro.fusion.slow_smoother import run_smoother
+from vgyro.units import rrw_deg_h_rt_h
 
 LEAST_RANGE = 1.0
 """Range of the temperature, K, from which the biases may be regressed on it."""
@@ -80,7 +81,7 @@ def slow_errors(
     variance    : [N] or [B, N], (deg/s)² of a sample, such that variance/n is that of the mean of n samples: of
                   coloured noise the long-run one. Where it is not finite or not above 0 the gyro is not used
     correlation : [N, N] of the noise; None: that of array.noise
-    blocks      : SlowBlocks.of(array);  tune : multiply K by what the likelihood of the blocks prefers
+    blocks      : SlowBlocks.of(array);  tune : take K by the likelihood of the blocks where that gains enough
     returns     : SlowErrors
     raises      : DataError where the correlation is not positive definite, or the variance does not fit
     Model: vgyro.fusion.slow_model; with the noise of the walks K_i·K_j·corr_ij, that of Bayard & Ploen
@@ -167,15 +168,16 @@ def _temperature(array: ArrayRates, parameters: FilterParameters, blocks: SlowBl
 
 
 def _of_walk(array: ArrayRates, walk: Walk) -> str:
+    gained = f"(2Δ log L = {walk.gain:.1f})"
+    if walk.how == "each":
+        return f"K = {', '.join(f'{rrw_deg_h_rt_h(one):.3g}' for one in walk.rrw)} deg/h/√h by likelihood {gained}"
+    if walk.how == "together" and not np.any(array.noise.rrw > 0):
+        return f"no random walk is known: K = {rrw_deg_h_rt_h(walk.rrw[0]):.3g} deg/h/√h of all by likelihood {gained}"
     unknown = np.flatnonzero(~np.isfinite(array.noise.rrw))
     which = ", ".join(str(index + 1) for index in unknown)
-    if not np.isfinite(walk.multiplier):
-        if not walk.rrw.any():
-            return "no random walk of the biases is known, and the differences show none: they are constant"
-        return f"no random walk is known: one for all gyros, by likelihood (2Δ log L = {walk.gain:.1f})"
     without = f"no random walk is known of gyro {which}: its bias is constant" if which else ""
-    tuned = f"K × {walk.multiplier:.2f} by likelihood (2Δ log L = {walk.gain:.1f})" if walk.multiplier != 1 else ""
-    return "; ".join(filter(None, [without, tuned]))
+    scale = walk.rrw.max() / np.nanmax(array.noise.rrw) if walk.how == "together" else 1.0
+    return "; ".join(filter(None, [without, f"K × {scale:.3g} by likelihood {gained}" if scale != 1.0 else ""]))
 
 
 def _of_temperature(choice: Choice, anchored: bool) -> str:

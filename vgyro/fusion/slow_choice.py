@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_model import Evidence, empirical_prior, log_likelihood, walk_covariance
+from vgyro.fusion.slow_model import Evidence, empirical_prior, log_likelihood, log_likelihood_slope, walk_covariance
 from vgyro.fusion.slow_smoother import Filtered, Information
 
 MOST_BLOCKS, WINDOWS = 2000, 10
 """K is chosen on at most about so many blocks, in windows spread over the recording."""
 FINENESS = 8.0
 """Blocks are merged to this part of the time in which the fastest walk is as large as the white noise."""
-LARGEST, LARGEST_UNKNOWN = 10.0, 1e4
-"""K is multiplied by 1/LARGEST to LARGEST; where none is known the smallest to be seen, by 1 to LARGEST_UNKNOWN."""
-STARTS, PRECISION = 5, 0.02
-WORTH = 3.84
-"""Gain of 2Δ log likelihood from which another K is believed: 95 % of chi² with one degree of freedom."""
+FASTEST = 10.0
+"""Fastest K: over a block the walk is so many times as large as the white noise of the block's mean."""
+STARTS, PRECISION, ROUNDS = 9, 0.05, 30
+SIGNIFICANT = 0.95
+"""Another K is believed from this quantile of chi² on, with as many degrees of freedom as there are more parameters."""
 BROAD = 100.0
 """Variance of the initial biases, of that found with the K that was given, while models are compared."""
 
@@ -29,13 +30,13 @@ BROAD = 100.0
 class Walk:
     """What was chosen.
 
-    rrw  : K [N], deg/s/√s, as used;  multiplier : of the K that were given; NaN where none was known
-    gain : 2Δ log likelihood of the K used over those given
+    rrw : K [N], deg/s/√s, as used;  gain : 2Δ log likelihood of them over those given
+    how : as given; all of one size or multiplied by one number; each by its own
     """
 
     rrw: np.ndarray
-    multiplier: float
-    gain: float
+    gain: float = 0.0
+    how: Literal["given", "together", "each"] = "given"
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Choice:
 def choose(
     evidence: Evidence, blocks: SlowBlocks, rrw: np.ndarray, correlation: np.ndarray, arw: np.ndarray, tune: bool
 ) -> Choice:
-    """Multiplier of the random walks' K with and without temperature slopes, and which of the two the data support.
+    """The random walks' K with and without temperature slopes, and which of the two models the data support.
 
     rrw, correlation : K [N], deg/s/√s, NaN if unknown, and [N, N] of the walks
     arw  : [N], deg/s/√Hz, of the white noise, about;  tune : False leaves K as it is
@@ -75,7 +76,7 @@ def choose(
         plain = both.first_regressors(gyros)
     else:
         plain = search.filtered(information.first_regressors(gyros), walk)
-    gain = 2.0 * (_best_slopes(both, search.broad) - log_likelihood(plain, search.broad))
+    gain = 2.0 * (_best_slopes(both, search.broad)[1] - log_likelihood(plain, search.broad))
     needed = math.log(len(blocks))
     if gain > needed:
         return Choice(other, information, both, True, gain, needed)
@@ -84,16 +85,15 @@ def choose(
 
 @dataclass(frozen=True)
 class _Search:
-    """Likelihood of multiples of K on some of the blocks.
+    """Likelihood of the walks on some of the blocks.
 
-    shape [N] : K of multiple 1;  given : it was given;  bounds : of the multiple;  broad [N] : prior of initial biases
+    given [N] : K as given, 0 where unknown;  bounds : of K;  broad [N] : prior of the initial biases
     """
 
     evidence: Evidence
     information: Information
-    shape: np.ndarray
+    given: np.ndarray
     correlation: np.ndarray
-    given: bool
     bounds: tuple[float, float]
     broad: np.ndarray
 
@@ -101,53 +101,81 @@ class _Search:
     def of(
         cls, evidence: Evidence, blocks: SlowBlocks, rrw: np.ndarray, correlation: np.ndarray, arw: np.ndarray
     ) -> _Search:
-        known = np.where(np.isfinite(rrw), rrw, 0.0)
-        given = bool(known.any())
-        duration = float(blocks.time[-1] - blocks.time[0])
+        given = np.where(np.isfinite(rrw), rrw, 0.0)
+        block_s = float(np.median(np.diff(blocks.time))) if len(blocks) > 1 else 1.0
+        duration = max(float(blocks.time[-1] - blocks.time[0]), block_s)
         # Over the whole recording the smallest walk that could be seen is as large as the mean of the white noise.
-        smallest = float(np.median(arw)) / duration if duration > 0 else 0.0
-        shape = known if given else np.full(len(rrw), smallest)
-        kept, first = _thinned(blocks, float((arw / np.maximum(shape, smallest)).min()) if duration > 0 else 0.0)
+        bounds = (float(np.median(arw)) / duration, FASTEST * float(np.median(arw)) / block_s)
+        kept, first = _thinned(blocks, float((arw / np.maximum(given, bounds[0])).min()) / block_s)
         part = evidence.part(kept)
         information = part.information().merged(first)
-        bounds = (1 / LARGEST, LARGEST) if given else (1.0, LARGEST_UNKNOWN)
-        still = part.filtered(information.first_regressors(len(rrw)), walk_covariance(known, correlation))
+        still = part.filtered(information.first_regressors(len(rrw)), walk_covariance(given, correlation))
         broad = np.full(len(rrw), BROAD * float(empirical_prior(still, len(rrw)).max()))
-        return cls(part, information, shape, correlation, given, bounds, broad)
+        return cls(part, information, given, correlation, bounds, broad)
 
     def best(self, tune: bool, slopes: bool) -> Walk:
-        """The K with the highest likelihood, with or without temperature slopes; as given, unless that is WORTH it."""
-        gyros = len(self.shape)
-        part = self.information if slopes else self.information.first_regressors(gyros)
+        """The K with the highest likelihood, with or without temperature slopes.
 
-        def likelihood(scale: float) -> float:
-            walk = walk_covariance(scale * self.shape, self.correlation)
-            filtered = self.evidence.filtered(part, walk)
-            return _best_slopes(filtered, self.broad) if slopes else log_likelihood(filtered, self.broad)
+        As given; all multiplied by one number, or of one size where none is known; or each its own: the more, the more
+        likelihood they must gain.
+        """
+        from scipy.stats import chi2
 
-        scale, gain = 1.0 if self.given else 0.0, 0.0
-        if tune and self.shape.any():
-            other, highest = _highest(likelihood, self.bounds)
-            more = 2.0 * (highest - likelihood(scale))
-            if more > WORTH:
-                scale, gain = other, more
-        return Walk(scale * self.shape, scale if self.given else math.nan, gain)
+        walk = Walk(self.given)
+        if not tune:
+            return walk
+        part = self.information if slopes else self.information.first_regressors(len(self.given))
+        least, most = self.bounds
+        shape = self.given / self.given.max() if self.given.any() else np.ones(len(self.given))
+        start = self._likelihood(part, self.given)[0]
+        scale, highest = _highest(lambda one: self._likelihood(part, one * shape)[0], self.bounds)
+        if 2.0 * (highest - start) > chi2.ppf(SIGNIFICANT, 1):
+            walk = Walk(scale * shape, 2.0 * (highest - start), "together")
+        each, own = self._each(part, np.clip(walk.rrw, least, most))
+        more = 2.0 * (own - start) - walk.gain
+        if more > chi2.ppf(SIGNIFICANT, len(shape)):
+            walk = Walk(each, walk.gain + more, "each")
+        return walk
+
+    def _each(self, part: Information, start: np.ndarray) -> tuple[np.ndarray, float]:
+        """K [N] with the highest likelihood near `start`, and that likelihood."""
+        from scipy.optimize import minimize
+
+        def negative(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
+            value, slope = self._likelihood(part, np.exp(logarithms), slope=True)
+            return -value, -slope
+
+        limits = [tuple(np.log(self.bounds))] * len(start)
+        options = {"maxiter": ROUNDS, "maxfun": 2 * ROUNDS, "ftol": 1e-7, "gtol": PRECISION}
+        found = minimize(negative, np.log(start), jac=True, method="L-BFGS-B", bounds=limits, options=options)
+        return np.exp(found.x), -float(found.fun)
+
+    def _likelihood(self, part: Information, rrw: np.ndarray, slope: bool = False) -> tuple[float, np.ndarray]:
+        """Log likelihood of K [N], and its derivatives by log K [N] if they are asked for."""
+        filtered = self.evidence.filtered(part, walk_covariance(rrw, self.correlation))
+        prior, value = self.broad, math.nan
+        if len(filtered.squares) > 1 + len(rrw):
+            prior, value = _best_slopes(filtered, self.broad)
+        else:
+            value = log_likelihood(filtered, prior)
+        if not slope:
+            return value, np.zeros(0)
+        return value, log_likelihood_slope(part, filtered, prior, rrw, self.correlation)
 
     def filtered(self, information: Information, walk: Walk) -> Filtered:
         """All blocks, with a walk."""
         return self.evidence.filtered(information, walk_covariance(walk.rrw, self.correlation))
 
 
-def _thinned(blocks: SlowBlocks, crossing_s: float) -> tuple[np.ndarray, np.ndarray]:
+def _thinned(blocks: SlowBlocks, crossing: float) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the blocks that are kept, and first of each group of them that is merged, counted among those kept.
 
-    crossing_s : time in which the fastest walk is as large as the white noise. No group reaches over a gap.
+    crossing : blocks in which the fastest walk becomes as large as the white noise. No group reaches over a gap.
     """
     begin = np.flatnonzero(np.diff(blocks.stretch, prepend=-1))
     inside = np.arange(len(blocks)) - begin[blocks.stretch]
-    whole = float(np.median(np.diff(blocks.time))) if len(blocks) > 1 else 1.0
     most = -(-len(blocks) // MOST_BLOCKS)
-    together = int(min(max(crossing_s / FINENESS / whole, 1.0), most))
+    together = int(min(max(crossing / FINENESS, 1.0), most))
     starts = inside % together == 0
     group = np.cumsum(starts) - 1
     stride = max((int(group[-1]) + 1) // WINDOWS, 1)
@@ -168,14 +196,16 @@ def _highest(likelihood: Callable[[float], float], bounds: tuple[float, float]) 
     return math.exp(float(found.x)), -float(found.fun)
 
 
-def _best_slopes(filtered: Filtered, broad: np.ndarray) -> float:
-    """Log likelihood with temperature slopes of the common variance that makes it highest."""
+def _best_slopes(filtered: Filtered, broad: np.ndarray) -> tuple[np.ndarray, float]:
+    """Prior [2N] with the common variance of the temperature slopes that makes the likelihood highest, and its log."""
     gyros = len(broad)
     seen = float(np.diag(filtered.squares)[1 + gyros :].max())
+
+    def prior(variance: float) -> np.ndarray:
+        return np.concatenate([broad, np.full(gyros, variance)])
+
     if seen <= 0:
-        return log_likelihood(filtered, np.concatenate([broad, np.zeros(gyros)]))
-    # From slopes that the data could hardly show to those a million times as large.
-    smallest = 1e-2 / seen
-    return _highest(
-        lambda one: log_likelihood(filtered, np.concatenate([broad, np.full(gyros, one)])), (smallest, 1e12 * smallest)
-    )[1]
+        return prior(0.0), log_likelihood(filtered, prior(0.0))
+    # From slopes that the data could hardly show to those ten thousand times as large.
+    variance, value = _highest(lambda one: log_likelihood(filtered, prior(one)), (1e-2 / seen, 1e6 / seen))
+    return prior(variance), value

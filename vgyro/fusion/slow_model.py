@@ -14,14 +14,14 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_smoother import Filtered, Information, run_filter
+from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filter
 
 FREEDOM = 2.0
 """Degrees of freedom ν of the initial biases' Student distribution. Above N - 2 one gyro however far off is believed
 as much as the rest: its likelihood falls by d^-(ν+1), that of N - 1 wider biases by d^-(N-1)."""
 STEPS, SETTLED = 500, 1e-9
-LEAST = 1e-9
-"""Least variance of the constants beforehand, of that with which one is measured."""
+LEAST = 1.0
+"""Least variance of the constants beforehand, in that with which one is measured: an estimate may vanish by chance."""
 
 
 @dataclass(frozen=True)
@@ -88,16 +88,20 @@ class Evidence:
         return Information(self.weight, vector, total, np.diff(self.time, prepend=self.time[:1]), self.jump)
 
     def filtered(self, information: Information, walk: np.ndarray) -> Filtered:
-        """The filter's forward pass; without anchors the common part of the constants is exactly unseen."""
+        """The filter's forward pass.
+
+        What rounding takes for information on the constants, or against it, is taken out: without anchors their common
+        parts are not seen at all, and nowhere is there less than none.
+        """
         filtered = run_filter(information, walk)
-        if self.anchored:
-            return filtered
         gyros = self.means.shape[1]
         squares = filtered.squares.copy()
-        for start in range(1, len(squares), gyros):
+        for start in range(1, len(squares), gyros) if not self.anchored else ():
             rows = slice(start, start + gyros)
             squares[rows] -= squares[rows].mean(axis=0)
             squares[:, rows] -= squares[:, rows].mean(axis=1)[:, None]
+        values, vectors = np.linalg.eigh((squares[1:, 1:] + squares[1:, 1:].T) / 2)
+        squares[1:, 1:] = (vectors * np.maximum(values, 0.0)) @ vectors.T
         return replace(filtered, squares=squares)
 
 
@@ -155,6 +159,24 @@ def log_likelihood(filtered: Filtered, prior: np.ndarray) -> float:
     return -0.5 * (log_det + float(filtered.squares[0, 0]) - float(explained @ explained))
 
 
+def log_likelihood_slope(
+    blocks: Information, filtered: Filtered, prior: np.ndarray, rrw: np.ndarray, correlation: np.ndarray
+) -> np.ndarray:
+    """Derivatives [N] of log_likelihood by log K_i, exactly.
+
+    With respect to Q_t it is ½(rr' - Λ), and with constants β that are not known ½(E rr' - Λ) over their posterior.
+    Koopman & Shephard (1992), Biometrika 79, 823-826.
+    """
+    score, weight = run_back(blocks, filtered)
+    found = posterior(filtered, prior)
+    left = score[..., 0] - score[..., 1:] @ found.mean
+    gap = blocks.gap
+    across = np.einsum("b,bik,bjl->ikjl", gap, score[..., 1:], score[..., 1:], optimize=True)
+    excess = (gap[:, None] * left).T @ left + np.einsum("ikjl,kl->ij", across, found.covariance)
+    excess -= np.tensordot(gap, weight, axes=1)
+    return rrw * ((excess * correlation) @ rrw)
+
+
 def empirical_prior(filtered: Filtered, gyros: int) -> np.ndarray:
     """Variances [k] of the constants beforehand, from their own spread: empirical Bayes.
 
@@ -162,10 +184,14 @@ def empirical_prior(filtered: Filtered, gyros: int) -> np.ndarray:
     s²/λ_i: λ_i = (ν + 1)/(ν + E b_i²/s²), s² = mean λ_i·E b_i², again and again (an EM algorithm; E b_i² is that of the
     posterior). What all share goes to the motion where nothing anchors it, so they are about their robust centre,
     whose variance is 1/Σ(λ_i/s²). That is too small, for the information of a Student location is (ν + 1)/(ν + 3) of
-    that of its weights: the variances are enlarged by the inverse.
-    Temperature slopes: independent normal variables of one variance.
+    that of its weights, and for s is known from N - 1 differences alone: the variances are enlarged by the inverse of
+    the former, and such that 1.96 standard deviations reach as far as the 95 % limits of a Student variable of N - 1
+    degrees of freedom.
+    Temperature slopes: independent normal variables of one variance, enlarged for the latter reason.
     Lange, Little & Taylor (1989), J. Am. Stat. Assoc. 84, 881-896.
     """
+    from scipy.stats import norm, t
+
     constants = len(filtered.squares) - 1
     seen = np.diag(filtered.squares)[1:]
     # Begins wide: the squared estimate of each alone, or what one measurement of all would leave open.
@@ -181,6 +207,7 @@ def empirical_prior(filtered: Filtered, gyros: int) -> np.ndarray:
         before, size = size, np.maximum((share * second).mean(axis=1), least)
         if np.all(np.abs(size - before) <= SETTLED * before):
             break
-    prior = size[:, None] / share
+    few = float(t.ppf(0.975, max(gyros - 1, 1)) / norm.ppf(0.975)) ** 2
+    prior = few * size[:, None] / share
     prior[0] *= (FREEDOM + 3) / (FREEDOM + 1)
     return prior.ravel()

@@ -100,11 +100,10 @@ def _summed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.tensordot(one, other, axes=([0, 1], [0, 1]))
 
 
-def run_smoother(blocks: Information, filtered: Filtered) -> tuple[np.ndarray, np.ndarray]:
-    """Backward pass: two-sided estimates [B, N, 1 + k] of each column and covariance [B, N, N].
+def run_back(blocks: Information, filtered: Filtered) -> tuple[np.ndarray, np.ndarray]:
+    """Backward pass: r ← W·e + L'r [B, N, 1 + k] and Λ ← W + L'ΛL [B, N, N], with W = L'G.
 
-    r ← W·e + L'r, Λ ← W + L'ΛL, W = L'G;  x_s = x + P·r, P_s = P - PΛP: the smoother of Bryson & Frazier (1963), equal
-    to that of Rauch, Tung & Striebel, and without the inverse of P, which is singular where a state does not walk.
+    What this block and all later ones say: by r the one-sided state is corrected, Λ is the covariance of r.
     """
     keep = filtered.keep
     turned = np.ascontiguousarray(keep.transpose(0, 2, 1))
@@ -116,6 +115,16 @@ def run_smoother(blocks: Information, filtered: Filtered) -> tuple[np.ndarray, n
         r = score[index] + back @ r
         curvature = weight[index] + back @ curvature @ keep[index]
         score[index], weight[index] = r, curvature
+    return score, weight
+
+
+def run_smoother(blocks: Information, filtered: Filtered) -> tuple[np.ndarray, np.ndarray]:
+    """Two-sided estimates [B, N, 1 + k] of each column and covariance [B, N, N].
+
+    x_s = x + P·r, P_s = P - PΛP: the smoother of Bryson & Frazier (1963), equal to that of Rauch, Tung & Striebel, and
+    without the inverse of P, which is singular where a state does not walk.
+    """
+    score, weight = run_back(blocks, filtered)
     P = filtered.covariance
     smoothed = filtered.state + P @ score
     covariance = P - P @ weight @ P
