@@ -70,9 +70,9 @@ class BlockMoments:
         return np.maximum(total, 0.0) / self.size[:, None], mean
 
 
-def block_moments(array: ArrayRates) -> BlockMoments:
-    """Blocks of about 0.25 s, 16 samples at least; of single samples where the rate is below 8 Hz."""
-    start, stop, low, high = _edges(array)
+def block_moments(array: ArrayRates, size: int | None = None) -> BlockMoments:
+    """Moments of blocks of `size` samples; None: of about 0.25 s, 16 samples at least, single ones below 8 Hz."""
+    start, stop, low, high = _edges(array, block_size(array.rate_hz) if size is None else size)
     gyros = array.rate.shape[1]
     square = np.empty((len(start), gyros, gyros))
     mean = np.empty((len(start), gyros))
@@ -97,9 +97,8 @@ def block_size(rate_hz: float) -> int:
     return 1 if rate_hz < SINGLE_BELOW_HZ else max(FEWEST_SAMPLES, round(BLOCK_S * rate_hz))
 
 
-def _edges(array: ArrayRates) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _edges(array: ArrayRates, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """start, stop, low, high of the blocks; what is left over in a stretch is of its last block."""
-    size = block_size(array.rate_hz)
     starts, stops, lows, highs, number = [], [], [], [], 0
     for part in array.stretches():
         count = max(1, (part.stop - part.start) // size)
@@ -143,7 +142,7 @@ def _stuck(step: np.ndarray, size: np.ndarray) -> np.ndarray:
         return stuck
     over, samples = (sum(one[shift : shift + windows] for shift in range(blocks)) for one in (step, size))
     small = over <= STUCK_SHARE * np.median(over, axis=1, keepdims=True)
-    small &= (samples >= STUCK_SAMPLES)[:, None]
+    small &= np.greater_equal(samples, STUCK_SAMPLES)[:, None]
     for shift in range(blocks):
         stuck[shift : shift + windows] |= small
     return stuck

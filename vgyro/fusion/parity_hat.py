@@ -96,14 +96,14 @@ def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[
     The slow part (drift, bias) is left out, and so are the blocks that are excluded, or where one gyro is an outlier.
     """
     outlier = np.zeros(moments.excluded.shape, dtype=bool)
-    variance = _solve(moments, ~outlier.any(axis=1), correlation)
+    variance = _solve(moments, np.ones(len(outlier), dtype=bool), correlation)
     for _ in range(2):
         best = best_weights(np.broadcast_to(variance, outlier.shape), moments.excluded, correlation)
         mean_square = moments.residual(best.weights)[0] + best.variance[:, None]
         outlier = outliers(np.where(moments.excluded, 0.0, mean_square))
         if not outlier.any():
             break
-        variance = _solve(moments, ~outlier.any(axis=1), correlation)
+        variance = _solve(moments, np.logical_not(outlier.any(axis=1)), correlation)
     return variance, outlier
 
 
