@@ -68,7 +68,7 @@ def test_the_sampled_filter_is_near_the_continuous_one():
 @pytest.mark.parametrize("bandwidth_hz", [1.0, 5.0])
 def test_bandwidth_and_delay_are_those_measured(make_array, bandwidth_hz):
     # Expected: what an added motion shows, of the whole filter with its biases and scale errors.
-    array, parameters = make_array(1 << 17, np.full(6, 0.1)), FilterParameters(bandwidth_hz=bandwidth_hz)
+    array, parameters = make_array(1 << 17, np.full(6, 0.1)), replace(MOVING, bandwidth_hz=bandwidth_hz)
     fused, measured = stubberud_2008(array, parameters), measured_response(stubberud_2008, array, parameters)
     assert fused.bandwidth_hz == pytest.approx(measured.bandwidth_hz, rel=5e-3)
     assert fused.noise_bandwidth_hz == pytest.approx(measured.noise_bandwidth_hz, rel=5e-3)
@@ -143,7 +143,7 @@ def test_biases_are_kept_over_gaps(make_array):
     singles = 500
     segment = np.concatenate([np.zeros(200_000, dtype=np.int32), 1 + np.arange(singles, dtype=np.int32)])
     array = without_walk(make_array(len(segment), UNEQUAL, segment=segment))
-    fused = stubberud_2008(array, FilterParameters(scale_sd=1e-6)).rate
+    fused = stubberud_2008(array, FilterParameters()).rate
     expected = 1.0 / (design.information(array.noise.R) * array.period)
     assert np.mean(fused[200_000:] ** 2) == pytest.approx(expected, rel=0.19)
     alone = stubberud_2008(array.part(slice(200_000, 200_001)), FilterParameters())
@@ -181,8 +181,11 @@ def test_q_gives_the_bandwidth_of_a_random_walk_filter(make_array):
     np.testing.assert_array_equal(given.rate, stubberud_2008(array, same).rate)
 
 
-def test_at_rest_the_note_claims_no_scale_errors(make_array):
-    assert "nothing is learned" in stubberud_2008(make_array(100, UNEQUAL), FilterParameters()).note
+def test_at_rest_there_are_no_scale_errors(make_array):
+    array = make_array(20_000, UNEQUAL)
+    fused, other = (stubberud_2008(array, FilterParameters(scale_sd=sd)) for sd in (0.001, 0.1))
+    assert "held at zero" in fused.note
+    np.testing.assert_array_equal(fused.rate, other.rate)
 
 
 def test_reasons(make_array):

@@ -12,7 +12,8 @@ noise-equivalent one 3ω/(4√2), the gain of a constant rate 1, and the delay a
 0.79·ω it amplifies by 1.27. Steady has the sampled filter's figures: it is narrower, by 2 % for 5 Hz at 200 Hz.
 
 The plain sum of the scale errors is zero, as for identical gyros it should. Where the gyros are not alike, a rate that
-is smaller than the model expects looks like a scale error of the better ones: at rest, the scale errors say nothing.
+is smaller than its model expects looks like a scale error of the better ones. So in a recording at rest, which says
+nothing of scale errors, they are held at zero.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 
 INFERRED = (
     "all but that it is an EKF of several sensors; rate: integrated random walk of the configured bandwidth; biases: "
-    "random walks of the measured RRW; scale errors: constant, of prior standard deviation scale_sd; the sums of "
-    "biases and of scale errors are zero, since no gyro tells the common part from the rate; diffuse start"
+    "random walks of the measured RRW; scale errors: constant, of prior standard deviation scale_sd, zero in recordings "
+    "at rest; the sums of biases and of scale errors are zero, since no gyro tells the common part from the rate; "
+    "diffuse start"
 )
 DIFFUSE = 100.0
 """Standard deviation of what is not known at the start, over that of the noise of a sample."""
@@ -102,13 +104,12 @@ class Steady:
 
 
 def stubberud_2008(array: ArrayRates, parameters: FilterParameters) -> Fused:
-    """x = [w, ẇ, b_1..b_N, s_1..s_N], Σb = Σs = 0, one update a sample; in the style of Stubberud & Stubberud
-    (2008).
+    """x = [w, ẇ, b_1..b_N, s_1..s_N], Σb = Σs = 0, in the style of Stubberud & Stubberud (2008).
 
-    R from the ARW and the correlation, of b from the RRW, s constant with prior s.d. `scale_sd`, ẅ white with q_a from
-    `bandwidth_hz`; where `q` is given, from the bandwidth √(D·q)/2π that it gives to a random-walk filter. What is not
-    known at the start has DIFFUSE times the standard deviation of a sample. After a gap w and ẇ start anew; b and s are
-    kept, and b has walked on where the length of the gap is known.
+    R from the ARW and the correlation; b walks by the RRW; s is constant, of prior s.d. `scale_sd` in motion and zero
+    at rest; ẅ is white, with q_a from `bandwidth_hz` or, where `q` is given, from the bandwidth √(D·q)/2π that it gives
+    to a random-walk filter. What is not known at the start has DIFFUSE times the standard deviation of a sample. After
+    a gap w and ẇ start anew; b and s are kept, and b has walked on where the length of the gap is known.
     """
     noise = array.noise.with_arw(parameters.arw)
     walk = _walk(noise.rrw)
@@ -123,8 +124,8 @@ def stubberud_2008(array: ArrayRates, parameters: FilterParameters) -> Fused:
 
     fused, unknown = np.empty(len(array.rate)), DIFFUSE**2 * float(np.diag(R).max())
     gyros, parts = array.rate.shape[1], array.stretches()
-    state = np.zeros(2 + 2 * gyros)
-    variance = np.concatenate([np.zeros(2), np.full(gyros, unknown), np.full(gyros, parameters.scale_sd**2)])
+    state, scale_sd = np.zeros(2 + 2 * gyros), parameters.scale_sd if parameters.in_motion else 0.0
+    variance = np.concatenate([np.zeros(2), np.full(gyros, unknown), np.full(gyros, scale_sd**2)])
     covariance, biases = np.diag(variance), range(2, 2 + gyros)
     for part, gap in zip(parts, _gaps(array, parts), strict=True):
         state[:2] = float(np.mean(array.rate[part.start], dtype=float)), 0.0
@@ -166,7 +167,7 @@ def _gaps(array: ArrayRates, parts: list[slice]) -> list[float]:
 
 def _scales(state: np.ndarray, covariance: np.ndarray, parameters: FilterParameters) -> str:
     if not parameters.in_motion:
-        return "at rest nothing is learned of the scale errors"
+        return "scale errors are held at zero: a recording at rest says nothing of them"
     scales = slice(2 + len(state[2:]) // 2, None)
     found = zip(state[scales], np.sqrt(np.maximum(np.diag(covariance)[scales], 0.0)), strict=True)
     sizes = ", ".join(f"{100 * scale:+.2f} ± {100 * sd:.2f}" for scale, sd in found)

@@ -20,7 +20,7 @@ typedef struct {
 int vg_adaptive_scale_bias(const vg_adaptive_array *array, const double *rate, ptrdiff_t samples, double *state,
                            double *covariance, double *estimate);
 
-/* A bank of random-walk filters of the rate: each of `noises` noise covariances R_j with each of `walks` process noises. */
+/* A bank of random-walk filters of the rate: each of `noises` covariances R_j with each of `walks` process noises. */
 typedef struct {
     ptrdiff_t gyros, noises, walks;
     const double *share;   /* [noises, N-1]: R⁻¹1/1'R⁻¹1 without its first */
@@ -31,8 +31,8 @@ typedef struct {
     double least;          /* below which no probability falls, before they are made to add up to 1 again */
 } vg_adaptive_bank;
 
-/* mean, variance, probability [noises, walks]: before the first sample, in the end after the last; total [noises, walks]
-   grows by the probabilities of each sample.  estimate [samples]: Σ p·x after each update.
+/* mean, variance, probability [noises, walks]: before the first sample, in the end after the last;
+   total [noises, walks] grows by the probabilities of each sample.  estimate [samples]: Σ p·x after each update.
    Returns 0, or -2 without memory. */
 int vg_adaptive_mix(const vg_adaptive_bank *bank, const double *rate, ptrdiff_t samples, double *mean, double *variance,
                     double *probability, double *total, double *estimate);

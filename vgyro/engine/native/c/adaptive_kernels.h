@@ -1,4 +1,4 @@
-/* The extended Kalman filter, and the bank of filters: one sample after the other, the states (the members) in lockstep. */
+/* The extended Kalman filter and the bank of filters: sample by sample, the states or the members in lockstep. */
 
 VG_INLINE double VG(adaptive_sum)(v4 x) { return (x[0] + x[1]) + (x[2] + x[3]); }
 
@@ -50,7 +50,8 @@ VG_INLINE void VG(adaptive_predict)(const vg_adaptive_array *m, VG(adaptive_part
 }
 
 /* Error of each gyro's reading at the predicted state, and its scale 1 + s. */
-VG_INLINE void VG(adaptive_innovations)(const vg_adaptive_array *m, VG(adaptive_parts) a, const double *y, ptrdiff_t n) {
+VG_INLINE void VG(adaptive_innovations)(const vg_adaptive_array *m, VG(adaptive_parts) a, const double *y,
+                                        ptrdiff_t n) {
     const double w = a.state[0][0];
     for (ptrdiff_t i = 0; i < n; i++) {
         double scale = 1.0, bias = 0.0;
@@ -213,8 +214,8 @@ VG_INLINE void VG(adaptive_bank)(const vg_adaptive_bank *m, const double *rate, 
     }
 }
 
-static void VG(adaptive_mix)(const vg_adaptive_bank *m, const double *rate, ptrdiff_t samples, v4 *scratch, double *mean,
-                             double *variance, double *probability, double *total, double *estimate) {
+static void VG(adaptive_mix)(const vg_adaptive_bank *m, const double *rate, ptrdiff_t samples, v4 *scratch,
+                             double *mean, double *variance, double *probability, double *total, double *estimate) {
     const ptrdiff_t n = m->gyros, wide = vectors(m->walks), groups = m->noises * wide;
     double *columns[] = {mean, variance, probability, total};
     for (ptrdiff_t j = 0; j < m->noises; j++) {
