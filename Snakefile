@@ -47,6 +47,7 @@ include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/volatility.smk"
 include: "workflow/rules/fuse.smk"
 include: "workflow/rules/measure.smk"
+include: "workflow/rules/more_gyros.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/papers.smk"
 

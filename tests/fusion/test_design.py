@@ -85,6 +85,18 @@ def test_hold_gain_against_the_discrete_optimum():
     assert (optimal - held) / held == pytest.approx(-(x**2) / 24, rel=0.15)
 
 
+@pytest.mark.parametrize("tau", [0.5, 500.0, math.inf])
+def test_frequency_response(tau):
+    # Expected: eq. 15: the array's Laplace transform, (s + √(…))⁻¹·K·1 with K = P∞·1'R⁻¹; 1/√2 of H(0) at eq. 18.
+    frequency = np.array([0.0, 0.3, design.bandwidth(D, Q, tau)])
+    gain = np.sum(design.steady_variance(D, Q, tau) * np.linalg.solve(R, np.ones(6)))
+    expected = gain / (2j * np.pi * frequency + math.sqrt(1 / tau**2 + D * Q))
+    found = design.response(frequency, D, Q, tau)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert abs(found[2] / found[0]) == pytest.approx(math.sqrt(0.5))
+    assert found[0].real == pytest.approx(design.dc_gain(D, Q, tau))
+
+
 def test_attenuation():
     # Expected: at the bandwidth itself -3 dB and 45°.
     loss, lag = design.attenuation(1.0)

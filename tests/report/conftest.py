@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vgyro.fusion import ArrayNoise, FilterParameters
+from vgyro.fusion.more_gyros import MeanCorrelation, analyse
 from vgyro.storage.tables import Provenance, TableWriter, write_json, write_table
 from vgyro.tasks.common import Task
 
@@ -262,9 +264,17 @@ def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...]
     }, "crosscheck", PROVENANCE)  # fmt: skip
     _write_noise_in_common(folder, gyros)
     if recording == "rest":
+        _write_more_gyros(folder, gyros, value.reshape(len(gyros), -1))
         _write_effects(folder, gyros)
         for definition in ("level", "residual"):
             _write_volatility(folder / definition, gyros)
+
+
+def _write_more_gyros(folder: Path, gyros: tuple[str, ...], correlation: np.ndarray) -> None:
+    arw = np.array([NOISE.get(name, 0.05) for name in gyros])
+    mean = MeanCorrelation.of(correlation, correlation - 0.02, correlation + 0.02)
+    found = analyse(ArrayNoise(arw, arw, np.eye(len(arw))), mean, FilterParameters(), 20)
+    write_table(folder / "more_gyros.parquet", found.columns, "more_gyros", PROVENANCE, {"summary": found.summary})
 
 
 def _write_curves(folder: Path, level: dict[str, float]) -> None:

@@ -55,6 +55,7 @@ def test_the_page_has_every_part_in_order(page: str) -> None:
         "bias-temperature-x",
         "scale-temperature-x",
         "cross-allan-rest-x",
+        "more-rest-x",
         "rates-rest-x",
         "allan-rest-x",
         "spectrum-rest-x",

@@ -90,6 +90,15 @@ def dc_gain(D: float, q: float, tau: float = math.inf) -> float:
     return D * q / (s * (s + 1.0 / tau))
 
 
+def response(frequency_hz: np.ndarray, D: float, q: float, tau: float = math.inf) -> np.ndarray:
+    """Gain of the steady-state filter for a motion of these frequencies, H(2πi·f) [F], complex.
+
+    H(s) = (√(1/τ² + Dq) - 1/τ)/(s + √(1/τ² + Dq)); |H(2πi·f)/H(0)| is 1/√2 at the bandwidth. Eq. 15-18.
+    """
+    s = pole(D, q, tau)
+    return dc_gain(D, q, tau) * s / (2j * math.pi * np.asarray(frequency_hz, dtype=float) + s)
+
+
 def attenuation(ratio: float) -> tuple[float, float]:
     """Amplitude loss 1 - 1/√(1 + r²) and phase lag atan(r), rad, at r = frequency / bandwidth. Chang et al. (2012)."""
     return 1.0 - 1.0 / math.sqrt(1.0 + ratio**2), math.atan(ratio)

@@ -14,6 +14,7 @@ from vgyro.report.crosscheck import crosscheck_part
 from vgyro.report.html import bullets, details, heading, join, macro, paragraph
 from vgyro.report.methods import dynamic_table, response_table, rest_tables
 from vgyro.report.model import ArrayPart, DatasetPart
+from vgyro.report.more_gyros import more_gyros_part
 from vgyro.report.moved import MOVED_RULE, moved_table
 from vgyro.report.noise import allan_plot, cross_allan_plot, spectrum_plot, tones_table
 from vgyro.report.page import Section, render_page
@@ -83,6 +84,7 @@ def _child(dataset: DatasetPart, array: ArrayPart, opened: bool) -> Section:
         dynamic_table(dataset, array),
         response_table(dataset, array),
         crosscheck_part(array),
+        more_gyros_part(dataset, array),
     )
     return Section(array.anchor, recording.name, html, aside=recording.kind, opened=opened)
 

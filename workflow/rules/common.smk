@@ -329,6 +329,11 @@ def artefacts_of(wildcards):
                     for name in definitions(dataset)
                     for part in parts
                 ]
+    for source in noise_source(wildcards):
+        folder = source.removesuffix("/rates.parquet")
+        paths += [
+            f"{folder}/{axis}/more_gyros.parquet" for axis in DATASETS[dataset].board.axes
+        ]
     return paths
 
 
