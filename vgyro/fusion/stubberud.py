@@ -31,9 +31,8 @@ from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 
 INFERRED = (
     "all but that it is an EKF of several sensors; rate: integrated random walk of the configured bandwidth; biases: "
-    "random walks of the measured RRW; scale errors: constant, of prior standard deviation scale_sd, zero in recordings "
-    "at rest; the sums of biases and of scale errors are zero, since no gyro tells the common part from the rate; "
-    "diffuse start"
+    "random walks of the measured RRW; scale errors: constant, of prior s.d. scale_sd, zero in recordings at rest; the "
+    "sums of biases and of scale errors are zero, since no gyro tells the common part from the rate; diffuse start"
 )
 DIFFUSE = 100.0
 """Standard deviation of what is not known at the start, over that of the noise of a sample."""
