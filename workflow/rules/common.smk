@@ -332,7 +332,8 @@ def artefacts_of(wildcards):
     for source in noise_source(wildcards):
         folder = source.removesuffix("/rates.parquet")
         paths += [
-            f"{folder}/{axis}/more_gyros.parquet" for axis in DATASETS[dataset].board.axes
+            f"{folder}/{axis}/more_gyros.parquet"
+            for axis in DATASETS[dataset].board.axes
         ]
     return paths
 
