@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import table3
-from harness import NO_DCC, OURS, OURS_UNSMOOTHED, case, load, mean_of, ratio_of, run
+from harness import NO_DCC, OURS, OURS_UNSMOOTHED, Case, case, load, mean_of, ratio_of, run
 
 from vgyro.fusion import METHODS, Fused
 
@@ -16,6 +17,7 @@ TESTS = ("constant", "random", "sinusoid")
 BANDWIDTH = 1.053
 """Hz, of the filters with the paper's q and the twin's ARW: docs/methods.md"""
 ALIKE = 1.01
+FILTERS = ("jiang_random_walk", "jiang_markov")
 Figures = dict[str, dict[str, list[float]]]
 
 
@@ -67,10 +69,10 @@ def test_lowest_deviation_in_motion(moving, recording):
 @pytest.mark.full
 def test_amplitude_and_delay(moving):
     for recording in ("random", "sinusoid"):
-        ours = moving[recording][OURS]
+        ours, average = (moving[recording][name] for name in (OURS, "average"))
         assert np.abs(np.array(ours["amplitude"]) - 1).max() <= 0.005
-        # A tenth of a sample, 0.2 ms; the filter of the paper is 29 ms late.
-        assert np.abs(ours["delay"]).max() <= 2e-4
+        # The average has no delay: what is measured of it is chance. A twentieth of a sample; the filter is 29 ms late.
+        assert np.abs(np.array(ours["delay"]) - average["delay"]).max() <= 1e-4
     late = np.mean(moving["sinusoid"]["jiang_random_walk"]["delay"])
     assert late == pytest.approx(0.029, abs=0.002)
 
@@ -88,48 +90,64 @@ def test_at_rest_with_the_very_same_filter(static):
     assert ratio_of(static[OURS_UNSMOOTHED]["arw_1s"], static["average"]["arw_1s"]).mean <= ALIKE
 
 
+def as_printed(recording, seed, names, **parameters) -> tuple[Case, dict[str, Fused]]:
+    """Rows on gyros that the filters take as uncorrelated, as the paper's text does."""
+    one = case(load("jiang2012"), recording, seed, volatility=None, faults=False, **parameters)
+    noise = replace(one.array.noise, correlation=np.eye(6))
+    one = replace(one, array=replace(one.array, noise=noise))
+    return one, run(one, names).fused
+
+
 @pytest.mark.full
-def test_what_the_static_table_follows_from(static):
+def test_what_the_static_table_follows_from():
     # docs/methods.md: ARW computed at 1 s: average 2.64, random walk and Markov 2.32 deg/√h, ratio 0.880. The twin's
     # pole takes 0.2 % away. An hour knows σ(1 s) to 2 %, eight hours to 0.7 %; the ratio is of the same noise.
-    average, walk, markov = (static[name]["arw_1s"] for name in ("average", "jiang_random_walk", "jiang_markov"))
-    assert mean_of(average).mean == pytest.approx(2.64, rel=0.015)
-    assert mean_of(walk).mean == pytest.approx(2.32, rel=0.015)
-    assert mean_of(markov).mean == pytest.approx(2.32, rel=0.015)
-    assert ratio_of(walk, average).mean == pytest.approx(0.880, abs=0.005)
+    found: dict[str, list[float]] = defaultdict(list)
+    for seed in SEEDS:
+        one, fused = as_printed("static", seed, ["average", *FILTERS])
+        for name, each in fused.items():
+            found[name].append(table3.jiang_static(one, each, BANDWIDTH)["arw_1s"])
+    assert mean_of(found["average"]).mean == pytest.approx(2.64, rel=0.015)
+    for name in FILTERS:
+        assert mean_of(found[name]).mean == pytest.approx(2.32, rel=0.015)
+        assert ratio_of(found[name], found["average"]).mean == pytest.approx(0.880, abs=0.005)
 
 
 @pytest.mark.full
 def test_a_short_time_constant_gives_the_printed_markov_column():
     # docs/methods.md: τ = 0.5 s (gain 0.71) turns the printed average, 2.73, 22.72, 161.2, into 1.72, 16.15, 114.6.
     for seed in FEW:
-        one = case(load("jiang2012"), "static", seed, volatility=None, faults=False, tau_s=0.5)
-        ran = run(one, ["average", "jiang_markov"]).fused
-        (arw, drift), (arw_average, drift_average) = (
-            (found["arw_1s"], found["bias_drift"])
-            for found in (table3.jiang_static(one, ran[name], BANDWIDTH) for name in ("jiang_markov", "average"))
-        )
-        assert 2.73 * arw / arw_average == pytest.approx(1.72, rel=0.01)
-        assert 22.72 * drift / drift_average == pytest.approx(16.15, rel=0.01)
-        slow = [np.polyfit(np.arange(60), rate_by_minute(ran[name]), 1)[0] for name in ("jiang_markov", "average")]
-        assert 161.21 * slow[0] / slow[1] == pytest.approx(114.6, rel=0.01)
+        one, fused = as_printed("static", seed, ["average", "jiang_markov"], tau_s=0.5)
+        markov, average = (table3.jiang_static(one, fused[name], BANDWIDTH) for name in ("jiang_markov", "average"))
+        assert 2.73 * markov["arw_1s"] / average["arw_1s"] == pytest.approx(1.72, rel=0.01)
+        assert 22.72 * markov["bias_drift"] / average["bias_drift"] == pytest.approx(16.15, rel=0.02)
+        walks = [np.std(np.diff(by_minute(fused[name]))) for name in ("jiang_markov", "average")]
+        # White noise at the borders of the minutes: 1 %.
+        assert 161.21 * walks[0] / walks[1] == pytest.approx(114.6, rel=0.02)
 
 
-def rate_by_minute(fused: Fused) -> np.ndarray:
+def by_minute(fused: Fused) -> np.ndarray:
+    """Means of the minutes of an hour: what is left is drift."""
     return fused.rate.reshape(60, -1).mean(axis=1)
 
 
 @pytest.mark.full
-def test_what_the_dynamic_table_follows_from(moving):
+def test_what_the_dynamic_table_follows_from():
     # docs/methods.md: sine of 62.8 deg/s: amplitude 62.73, raw 1σ 2.04, with the lag removed 0.174; constant 1σ 0.167.
-    # The twin's sine has 62.83; the sensor's pole is left out of the truth. 120 s know a 1σ at 5.27 Hz to 2 %, eight of
-    # them to 0.7 %.
-    for name in ("jiang_random_walk", "jiang_markov"):
-        sine, constant = moving["sinusoid"][name], moving["constant"][name]
+    # 120 s know a 1σ at 5.27 Hz to 2 %, eight of them to 0.7 %. What is compared is the rate behind the sensor's pole.
+    for name in FILTERS:
+        sine: dict[str, list[float]] = defaultdict(list)
+        constant = []
+        for seed in SEEDS:
+            one, fused = as_printed("sinusoid", seed, [name])
+            for figure, value in table3.jiang_dynamic(one, fused[name]).items():
+                sine[figure].append(value)
+            one, fused = as_printed("constant", seed, [name])
+            constant.append(table3.jiang_dynamic(one, fused[name])["sigma"])
         assert 62.8 * np.mean(sine["amplitude"]) == pytest.approx(62.73, abs=0.02)
         assert np.mean(sine["sigma"]) == pytest.approx(2.04, abs=0.03)
         assert np.mean(sine["aligned"]) == pytest.approx(0.174, abs=0.007)
-        assert np.mean(constant["sigma"]) == pytest.approx(0.167, abs=0.005)
+        assert np.mean(constant) == pytest.approx(0.167, abs=0.005)
 
 
 @pytest.mark.parametrize("recording", TESTS)
@@ -140,4 +158,4 @@ def test_one_minute_of_each_motion(recording):
         assert found[OURS]["sigma"][0] < found[name]["sigma"][0], name
     if recording != "constant":
         assert found[OURS]["amplitude"][0] == pytest.approx(1, abs=0.005)
-        assert abs(found[OURS]["delay"][0]) < 2e-4
+        assert abs(found[OURS]["delay"][0] - found["average"]["delay"][0]) < 1e-4
