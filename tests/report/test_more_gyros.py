@@ -50,9 +50,10 @@ def test_plot_and_table(dataset: DatasetPart) -> None:
 
 def test_sentence_of_a_positive_correlation() -> None:
     # Expected: √(6/1.1) = 2.3355, √(12/1.22) = 3.1363, 1/√0.02 = 7.07; for ρ = 0.025 and 0.015 √(6/1.125) = 2.3094 and
-    # √(6/1.075) = 2.3625, √(12/1.275) = 3.0679.
+    # √(6/1.075) = 2.3625, √(12/1.275) = 3.0679. The array's own matrix is without correlation: √6 = 2.449.
     text = sentence(summary(6, 0.02, 0.015, 0.025))
     assert text.startswith("6 gyros with ρ = 0.0200 (0.0150 … 0.0250) give 2.335 (2.309 … 2.362) over one of them")
+    assert "This array itself, weighted by its own covariance, has 2.45. With" in text
     assert "12 would give 3.136 (3.068 … 3.2" in text
     assert "adds less than 1" in text
     assert "no number of them gives more than 7.07 (6.32 … 8.16)" in text

@@ -19,7 +19,7 @@ TITLE = "How many more gyros would help"
 RULE = (
     "Jiang et al. (2012), eq. 21: N alike gyros, every pair with the correlation ρ, have √(N/(1 + (N − 1)ρ)) times "
     "less white noise than one. Their variance is the mean of this array's; the point is this array itself, with the "
-    "weights of its own covariance, which may lie off the curve where its gyros are not alike. ρ is the mean of all "
+    "weights of its own covariance: off the curve where its gyros are not alike. ρ is the mean of all "
     "pairs, its limits those of the pairs together. Drift and faults are not in this."
 )
 
@@ -84,7 +84,13 @@ def sentence(summary: Record) -> str:
     second = f"{2 * gyros} would give {_told(summary['twice'])}" if summary["twice"][0] is not None else (
         f"{2 * gyros} cannot all have so negative a correlation"
     )  # fmt: skip
-    return f"{first}; {second}. {_beyond(summary)}"
+    return f"{first}; {second}. {_itself(summary)}{_beyond(summary)}"
+
+
+def _itself(summary: Record) -> str:
+    if summary["present_factor"] is None:
+        return ""
+    return f"This array itself, weighted by its own covariance, has {significant(summary['present_factor'])}. "
 
 
 def _beyond(summary: Record) -> str:
