@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from vgyro.config import MOTION_MODELS
+from vgyro.errors import DataError
+from vgyro.fusion.motion_calibration import calibration
 from vgyro.fusion.motion_evidence import Evidence, gather
 from vgyro.fusion.motion_models import Likelihood, Motion
 
@@ -15,9 +18,20 @@ NO_GAIN = 0.01
 """A motion that raises the log-likelihood by less is none."""
 GRID = 0.35
 """Step of the first search over the frequency at which rate and noise are alike, decades."""
-TRIES = 150
+TRIES = 200
 """Evaluations of the likelihood of one search over several parameters."""
 HIGHEST_DAMPING = 20.0
+NARROW = 1e-4
+"""Damping of an oscillation that is a sinusoid: no second oscillator drives it."""
+FLAT = {
+    "frequency_hz": (0.63, "frequency_hz"), "damping": (0.3, ""), "second_hz": (1.48, "frequency_hz"),
+    "second_damping": (0.04, ""), "sd": (1.0, "sd"),
+}  # fmt: skip
+"""Two oscillators that fit a flat band best, in units of what the best single one has."""
+CERTAIN = 100.0
+"""Log-likelihood over that of a constant rate from which on a second oscillator is worth a search."""
+STRONG = 8.0
+"""Lines of a periodogram that are certainly not noise, over its density."""
 
 Parameters = dict[str, float]
 
@@ -43,15 +57,13 @@ def choose_motion(
     raises : DataError if the samples do not change, or if r is not above zero; TooShort
     """
     evidence = gather(z, r, segment, rate_hz, phi, engine, moving)
-    rows, counts = [], []
-    for model in models:
-        parameters = _FITS[model](evidence)
-        total, count = evidence.log_likelihood(model, parameters)
-        constant = model == "oscillator" and parameters["q"] == 0.0
-        rows.append(Likelihood(model, total, -2.0 * total + (len(parameters) - constant) * math.log(count), parameters))
-        counts.append(count)
-    best = int(np.argmin([row.bic for row in rows]))
-    return Motion(rows[best].model, rows[best].parameters, rate_hz, tuple(rows), counts[best])
+    rows = tuple(_row(model, _FITS[model](evidence), evidence) for model in models)
+    for best in sorted(rows, key=lambda row: row.bic):
+        motion = Motion(best.model, best.parameters, rate_hz, rows)
+        factor = calibration(motion, evidence)
+        if math.isfinite(best.bic) and factor is not None:
+            return replace(motion, calibration=factor)
+    raise DataError("no motion model fits: every smoother breaks down", remedy="look for outliers in rate and noise")
 
 
 def _driven(model: str, order: int) -> Callable[[Evidence], Parameters]:
@@ -89,22 +101,35 @@ def _markov(evidence: Evidence) -> Parameters:
 
 
 def _oscillator(evidence: Evidence) -> Parameters:
-    """Starts narrow at the highest line of the periodogram, and wide at the r.m.s. frequency of the rate; first about a
-    constant, then about a random walk, where that is worth its parameter."""
+    """About a constant; then, each where it is worth its parameters, about a random walk, and driven by another one.
+
+    Starts narrow at the highest line of the periodogram, and wide at the r.m.s. frequency of the rate.
+    """
     line, centre = _frequencies(evidence)
     sd, half = math.sqrt(evidence.excess), 0.5 * evidence.rate_hz
-    bounds = {
-        "frequency_hz": (0.01 / evidence.duration_s, half),
-        "damping": (1e-9, HIGHEST_DAMPING),
-        "sd": (1e-6 * sd, 1e6 * sd),
-    }
+    hertz, losses = (0.01 / evidence.duration_s, half), (1e-9, HIGHEST_DAMPING)
+    bounds = {"frequency_hz": hertz, "damping": losses, "sd": (1e-6 * sd, 1e6 * sd)}
     starts = [{"frequency_hz": line, "damping": 0.02, "sd": sd}, {"frequency_hz": centre, "damping": 0.5, "sd": sd}]
-    constant = _search(evidence, "oscillator", starts, bounds, {"q": 0.0})
-    slow = evidence.noise_density * (2.0 * math.pi * min(0.1 * constant["frequency_hz"], 1.0)) ** 2
-    wanders = _search(evidence, "oscillator", [constant | {"q": slow}], bounds | {"q": (1e-12 * slow, 1e6 * slow)}, {})
-    gain = evidence.log_likelihood("oscillator", wanders)[0] - evidence.log_likelihood("oscillator", constant)[0]
-    samples = sum(len(one.z) for one in evidence.series)
-    return wanders if 2.0 * gain > math.log(samples) else constant
+    found = [_search(evidence, "oscillator", starts, bounds, {"q": 0.0})]
+    slow = evidence.noise_density * (2.0 * math.pi * min(0.1 * found[0]["frequency_hz"], 1.0)) ** 2
+    wider = bounds | {"q": (1e-12 * slow, 1e6 * slow)}
+    found.append(_search(evidence, "oscillator", [found[0] | {"q": slow}], wider, {}))
+    still = evidence.log_likelihood("random_walk", {"q": 0.0})[0]
+    certain = evidence.log_likelihood("oscillator", found[0])[0] - still > CERTAIN
+    if certain and NARROW < found[0]["damping"] < 1.0:
+        start = {name: value * found[0].get(of, 1.0) for name, (value, of) in FLAT.items()}
+        near = (0.1 * found[0]["frequency_hz"], min(10.0 * found[0]["frequency_hz"], half))
+        wider = bounds | dict.fromkeys(("frequency_hz", "second_hz"), near)
+        wider |= dict.fromkeys(("damping", "second_damping"), (1e-3, 2.0))
+        found.append(_search(evidence, "oscillator", [start], wider, {}))
+    return min(found, key=lambda parameters: _row("oscillator", parameters, evidence).bic)
+
+
+def _row(model: str, parameters: Parameters, evidence: Evidence) -> Likelihood:
+    total, count = evidence.log_likelihood(model, parameters)
+    # The frequency counts twice: it is the best of as many lines as there are samples.
+    free = len(parameters) + ("frequency_hz" in parameters) - (parameters.get("q") == 0.0)
+    return Likelihood(model, total, -2.0 * total + free * math.log(count), parameters, count)
 
 
 def _search(
@@ -130,22 +155,18 @@ def _search(
 
     def run(start: np.ndarray, size: float) -> tuple[float, np.ndarray]:
         simplex = np.vstack([start, start + size * np.eye(len(start))])
-        options = {"initial_simplex": simplex, "maxfev": TRIES, "xatol": 1e-4, "fatol": NO_GAIN}
+        options = {"initial_simplex": simplex, "maxfev": TRIES, "xatol": 0.02, "fatol": NO_GAIN}
         found = minimize(cost, start, method="Nelder-Mead", options=options)
         return float(found.fun), found.x
 
     logs = [np.clip(np.log([start[name] for name in names]), lowest, highest) for start in starts]
-    value, place = min((run(one, 0.7) for one in logs), key=_first)
+    value, place = min((run(one, 0.7) for one in logs), key=lambda found: found[0])
     again, other = run(place, -0.3)
     return parameters(other if again < value else place)
 
 
-def _first(found: tuple[float, np.ndarray]) -> float:
-    return found[0]
-
-
 def _frequencies(evidence: Evidence) -> tuple[float, float]:
-    """Highest line of the periodograms, and r.m.s. frequency of what they have above the noise, Hz."""
+    """Highest line of the periodograms, and r.m.s. frequency of the lines above the noise, Hz."""
     best, moments = (0.0, 1.0 / evidence.duration_s), np.zeros(2)
     for one in evidence.series:
         told = np.isfinite(one.r)
@@ -155,7 +176,7 @@ def _frequencies(evidence: Evidence) -> tuple[float, float]:
         frequency = np.fft.rfftfreq(len(one.z), one.size / evidence.rate_hz)
         # Of white noise alone, and of the sum over a line of amplitude A, A²/4·(Σ window)²
         noise = float(np.mean(one.r[told])) * float(np.sum(window**2))
-        power, frequency = np.maximum(power[1:-1] - 2.0 * noise, 0.0), frequency[1:-1]
+        power, frequency = np.where(power > STRONG * noise, power, 0.0)[1:-1], frequency[1:-1]
         moments += [float(np.sum(power * frequency**2)) / noise, float(np.sum(power)) / noise]
         highest = int(np.argmax(power))
         best = max(best, (float(power[highest]) / float(np.sum(window)) ** 2, float(frequency[highest])))

@@ -29,12 +29,16 @@ WIDE = 1e6
 
 @dataclass(frozen=True)
 class Series:
-    """A gap-free stretch of samples, or of means of `size` of them; phi: of its noise."""
+    """A gap-free stretch of samples, or of means of `size` of them.
+
+    z, r : [T], deg/s and (deg/s)²;  phi : of the noise;  shrink : r over the mean variance of the samples
+    """
 
     z: np.ndarray
     r: np.ndarray
-    size: int
-    phi: float
+    size: int = 1
+    phi: float = 0.0
+    shrink: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,7 @@ class Evidence:
     noise_density: float
     duration_s: float
     excess: float
+    phi: float
     engine: str
 
     def log_likelihood(self, model: str, parameters: Mapping[str, float]) -> tuple[float, int]:
@@ -87,8 +92,8 @@ def wide_start(z: np.ndarray, r: np.ndarray, model: Dynamics, size: int = 1) -> 
     step = float(np.mean(np.diff(inside) ** 2)) if len(inside) > 1 else 0.0
     wide = (WIDE * noise + 100.0 * step) / float(size) ** (2.0 * model.order)
     states = len(model.reads)
-    wanders = np.isnan(model.stationary)
-    spread = np.diag(np.where(wanders, wide, model.stationary))
+    wanders = np.isnan(np.diagonal(model.stationary))
+    spread = np.where(np.diag(wanders), np.diag(wide), model.stationary)
     start = np.zeros(states)
     start[np.flatnonzero(wanders & (model.order == 0))[:1]] = z[told[0]]
     if size > 1:
@@ -118,20 +123,21 @@ def gather(
         size = max(-(-total // BLOCKS), math.ceil(20.0 / (1.0 - phi)) if phi else 2)
         series = [_piece(z, r, run, phi) for run in _windows(runs, total)]
         series += [_means(z, r, run, size, phi) for run in runs if run[1] - run[0] >= SHORTEST * size]
-    told = [one for one in series if np.isfinite(one.r).sum() >= SHORTEST]
+    told = [one for one in series if _told(one) >= SHORTEST]
     if not told:
         raise TooShort(f"fewer than {SHORTEST} samples that say anything in every stretch")
     values = np.concatenate([one.z[np.isfinite(one.r)] for one in told])
     noises = np.concatenate([one.r[np.isfinite(one.r)] for one in told])
     if np.all(values == values[0]):
         raise DataError(f"the rate is {values[0]:g} deg/s at every sample: no gyro", remedy="look at the recording")
-    noise = float(np.median(np.concatenate([one.r[np.isfinite(one.r)] * one.size for one in told])))
-    if phi == 0.0:
-        density = noise / rate_hz
-    else:
-        density = float(np.median(told[0].r[np.isfinite(told[0].r)])) / rate_hz * (1.0 + phi) / (1.0 - phi)
+    density = float(np.median(noises / np.repeat([one.shrink for one in told], [_told(one) for one in told])))
+    density *= (1.0 + phi) / (1.0 - phi) / rate_hz
     excess = max(float(np.var(values)) - float(np.mean(noises)), 1e-3 * density * rate_hz / math.sqrt(total))
-    return Evidence(told, rate_hz, density, total / rate_hz, excess, engine)
+    return Evidence(told, rate_hz, density, total / rate_hz, excess, phi, engine)
+
+
+def _told(one: Series) -> int:
+    return int(np.isfinite(one.r).sum())
 
 
 def _refuse(r: np.ndarray, runs: list[tuple[int, int]]) -> None:
@@ -179,7 +185,7 @@ def _windows(runs: list[tuple[int, int]], total: int) -> list[tuple[int, int]]:
 
 def _piece(z: np.ndarray, r: np.ndarray, run: tuple[int, int], phi: float) -> Series:
     part = slice(*run)
-    return Series(z[part], np.broadcast_to(r, z.shape)[part], 1, phi)
+    return Series(z[part], np.broadcast_to(r, z.shape)[part], phi=phi)
 
 
 def _means(z: np.ndarray, r: np.ndarray, run: tuple[int, int], size: int, phi: float) -> Series:
@@ -191,4 +197,4 @@ def _means(z: np.ndarray, r: np.ndarray, run: tuple[int, int], size: int, phi: f
     # Variance of the mean of AR(1) noise over that of one sample.
     power, rest = phi**size, 1.0 - phi
     shrink = ((1.0 + phi) / rest - 2.0 * phi * (1.0 - power) / (size * rest**2)) / size
-    return Series(means, variances * shrink, size, 0.0)
+    return Series(means, variances * shrink, size, shrink=shrink)

@@ -17,19 +17,20 @@ from vgyro.errors import DataError
 UNLIMITED = "none"
 """The model of a rate of which the neighbours say nothing: no smoothing."""
 
-UNITS = {"q": "", "frequency_hz": " Hz", "damping": "", "sd": " deg/s", "tau_s": " s"}
+UNITS = {"frequency_hz": " Hz", "damping": "", "second_hz": " Hz", "second_damping": "", "sd": " deg/s", "tau_s": " s"}
 Q_UNITS = {"random_walk": " deg²/s³", "acceleration": " deg²/s⁵", "jerk": " deg²/s⁷", "oscillator": " deg²/s³"}
 HALF_POWER = math.sqrt(0.5)
 
 
 @dataclass(frozen=True)
 class Likelihood:
-    """How well a model fits: its greatest log-likelihood, -2·log L + (parameters)·ln(samples), and where it is."""
+    """How well a model fits: its greatest log-likelihood, -2·log L + (parameters)·ln(samples), where, of how many."""
 
     model: str
     log_likelihood: float
     bic: float
     parameters: Mapping[str, float]
+    samples: int
 
 
 @dataclass(frozen=True)
@@ -38,17 +39,19 @@ class Motion:
 
     model      : random_walk, acceleration, jerk, oscillator, markov; none: no smoothing
     parameters : q, deg²/s³, deg²/s⁵, deg²/s⁷ of the white noise that drives the rate, its first and second derivative;
-                 oscillator: frequency_hz, damping, sd (deg/s) of the oscillation, q of the random walk below it;
+                 oscillator: frequency_hz, damping, sd (deg/s) of the oscillation, q of the random walk below it, or,
+                 where it drives a second one, second_hz and second_damping of that, and no random walk;
                  markov: tau_s, sd (deg/s)
     rate_hz    : of the samples
-    table      : the models that it was chosen from;  samples : how many they were compared on
+    calibration : what the variance of the smoothed rate is multiplied by, from the spectrum of the residual
+    table      : the models that it was chosen from
     """
 
     model: str
     parameters: Mapping[str, float]
     rate_hz: float
     table: tuple[Likelihood, ...] = ()
-    samples: int = 0
+    calibration: float = 1.0
 
     @property
     def text(self) -> str:
@@ -66,7 +69,7 @@ class Motion:
 class Dynamics:
     """Of n states: transition F and process Q [n, n], reads h [n] (the rate is h'x).
 
-    stationary : [n] variance of the states that have one; NaN: of a state that wanders, nothing is known before
+    stationary : [n, n] covariance of the states that have one; NaN on its diagonal: of a state that wanders
     order      : [n] which derivative of the rate the state is
     """
 
@@ -91,7 +94,7 @@ class Dynamics:
             F * scale[:, None],
             Q * np.outer(scale, scale),
             np.eye(states + 1)[states],
-            np.append(self.stationary, 0.0),
+            np.pad(self.stationary, (0, 1)),
             np.append(self.order, 0),
         )
 
@@ -113,7 +116,8 @@ def dynamics(model: str, parameters: Mapping[str, float], period: float) -> Dyna
     raises : DataError for a model that is not known
     """
     if model == "oscillator":
-        return _oscillator(**parameters, period=period)
+        make = _pair if "second_hz" in parameters else _oscillator
+        return make(**parameters, period=period)
     if model == "markov":
         return _markov(**parameters, period=period)
     if model not in _DRIVEN:
@@ -128,7 +132,7 @@ def dynamics(model: str, parameters: Mapping[str, float], period: float) -> Dyna
         F,
         parameters["q"] * period ** (2 * states - 1) * shape,
         np.eye(states)[0],
-        np.full(states, math.nan),
+        np.diag(np.full(states, math.nan)),
         np.arange(states),
     )
 
@@ -147,7 +151,7 @@ def _markov(tau_s: float, sd: float, period: float) -> Dynamics:
         np.diag([math.exp(-period / tau_s), 1.0]),
         np.diag([-(sd**2) * math.expm1(-2.0 * period / tau_s), 0.0]),
         np.ones(2),
-        np.array([sd**2, math.nan]),
+        np.diag([sd**2, math.nan]),
         np.zeros(2, dtype=int),
     )
 
@@ -168,7 +172,41 @@ def _oscillator(frequency_hz: float, damping: float, sd: float, q: float, period
         Q = 4.0 * damping * omega**3 * sd**2 * 0.5 * period * (rows * weights) @ rows.T
     whole, drive = np.eye(3), np.zeros((3, 3))
     whole[1:, 1:], drive[1:, 1:], drive[0, 0] = F, Q, q * period
-    return Dynamics(whole, drive, np.array([1.0, 1.0, 0.0]), np.append(math.nan, stationary), np.array([0, 0, 1]))
+    known = np.diag(np.append(math.nan, stationary))
+    return Dynamics(whole, drive, np.array([1.0, 1.0, 0.0]), known, np.array([0, 0, 1]))
+
+
+def _pair(
+    frequency_hz: float, damping: float, second_hz: float, second_damping: float, sd: float, period: float
+) -> Dynamics:
+    """An oscillator driven by an oscillator, of stationary s.d. `sd` about zero: states x and three derivatives.
+
+    Its density falls with the 8th power of the frequency: a rate that is limited to a band. F and Q by the matrix
+    exponential (Van Loan 1978, IEEE Trans. Autom. Control 23, 395-404), in units of time that make its entries alike.
+    """
+    from scipy.linalg import expm, solve_continuous_lyapunov
+
+    omega = 2.0 * math.pi * math.sqrt(frequency_hz * second_hz)
+    sections = [
+        [1.0, 2.0 * loss * 2.0 * math.pi * own / omega, (2.0 * math.pi * own / omega) ** 2]
+        for own, loss in ((frequency_hz, damping), (second_hz, second_damping))
+    ]
+    A = np.diag(np.ones(3), 1)
+    A[3] = -np.convolve(*sections)[:0:-1]
+    drive = np.diag([0.0, 0.0, 0.0, 1.0])
+    stationary = solve_continuous_lyapunov(A, -drive)
+    stationary *= sd**2 / stationary[0, 0]
+    strength = -2.0 * float(A[3] @ stationary[3])
+    scale = (omega * period) ** np.arange(4)
+    step = A * np.outer(scale, 1.0 / scale) * omega * period
+    system = np.zeros((8, 8))
+    system[:4, :4], system[4:, 4:], system[3, 7] = -step, step.T, 1.0
+    power = expm(system)
+    F = power[4:, 4:].T
+    Q = F @ power[:4, 4:] * strength * omega * period * scale[3] ** 2
+    return Dynamics(
+        F, 0.5 * (Q + Q.T), np.eye(4)[0], 0.5 * (stationary + stationary.T) * np.outer(scale, scale), np.arange(4)
+    )
 
 
 def _impulse_response(time: np.ndarray, omega: float, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -228,7 +266,7 @@ class SteadyGain:
         if ratio is not None:
             square = 0.25 * ratio * (math.sqrt(2.0) - 1.0)
             return self.motion.rate_hz / math.pi * math.asin(math.sqrt(square)) if square < 1.0 else math.nan
-        frequency = self._frequencies()
+        frequency = self.frequencies()
         above = np.flatnonzero(self.at(frequency) >= HALF_POWER)
         if above.size == 0:
             return 0.0
@@ -244,17 +282,19 @@ class SteadyGain:
         if ratio is not None:
             keep = random_walk_keep(ratio)
             return half * (1.0 - keep) * (1.0 + keep**2) / (1.0 + keep) ** 3
-        frequency = self._frequencies()
+        frequency = self.frequencies()
         gain = self.at(frequency)
         return float(np.trapezoid(gain**2, frequency) + gain[0] ** 2 * frequency[0])
 
-    def _frequencies(self) -> np.ndarray:
+    def frequencies(self) -> np.ndarray:
         """Dense where G changes: toward 0, and around the frequency of an oscillator."""
         half = 0.5 * self.motion.rate_hz
         frequency = half * np.logspace(-9.0, 0.0, 4000)
         if self.motion.model == "oscillator":
-            own, near = self.motion.parameters["frequency_hz"], np.logspace(-9.0, -0.05, 1500)
-            frequency = np.unique(np.concatenate([frequency, own * (1.0 - near), [own], own * (1.0 + near)]))
+            near = np.logspace(-9.0, -0.05, 1500)
+            for own in (self.motion.parameters.get(name, math.nan) for name in ("frequency_hz", "second_hz")):
+                frequency = np.concatenate([frequency, own * (1.0 - near), [own], own * (1.0 + near)])
+            frequency = np.unique(frequency)
         return frequency[frequency <= half]
 
 
@@ -268,7 +308,8 @@ def fixed_bandwidth(bandwidth_hz: float, r_mean: float, rate_hz: float) -> Motio
     """The random walk whose steady two-sided smoother has this -3 dB bandwidth at the sample rate, exactly.
 
     G(f) = 1/(1 + (r/Q)·4·sin²(π·f/rate)) is √½ there: Q = r·4·sin²(π·f/rate)/(√2 - 1). Above 0.4 of the sample rate
-    nothing is smoothed.
+    nothing is smoothed. It is for a board at rest, whose rate does not move with that bandwidth: the variance is that
+    of the noise which is left, ∫ G²·S_v, not the ∫ G·S_v of a rate that does.
     r_mean : mean variance of the noise, (deg/s)²
     """
     if not (math.isfinite(bandwidth_hz) and bandwidth_hz > 0 and math.isfinite(r_mean) and r_mean > 0):
@@ -276,4 +317,5 @@ def fixed_bandwidth(bandwidth_hz: float, r_mean: float, rate_hz: float) -> Motio
     if bandwidth_hz > 0.4 * rate_hz:
         return Motion(UNLIMITED, {}, rate_hz)
     Q = r_mean * 4.0 * math.sin(math.pi * bandwidth_hz / rate_hz) ** 2 / (math.sqrt(2.0) - 1.0)
-    return Motion("random_walk", {"q": Q * rate_hz}, rate_hz)
+    keep = random_walk_keep(Q / r_mean)
+    return Motion("random_walk", {"q": Q * rate_hz}, rate_hz, calibration=(1.0 + keep**2) / (1.0 + keep) ** 2)

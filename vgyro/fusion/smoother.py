@@ -34,7 +34,7 @@ class Smoothed:
     rate, variance     : [T], deg/s and (deg/s)², mean and variance given all samples of the gap-free stretch
     bandwidth_hz       : -3 dB, of the steady smoother at the mean of r; NaN: not limited; 0: the rate does not move
     noise_bandwidth_hz : noise-equivalent, one-sided, of the same; NaN: not limited
-    passes             : 2 where it is a first-order low-pass run forward and back, of this bandwidth in all; 0: it is not
+    passes             : 2 where it is a first-order low-pass run forward and back, of this bandwidth; 0: it is not
     parameters         : model and parameters, for people
     """
 
@@ -93,6 +93,12 @@ def smooth(
             continue
         model = StateSpace(F, Q, dynamics.reads, dynamics.reads, *start, pole=phi)
         rate[part], variance[part] = run(z[part], own, model, flags)
+        variance[part] *= motion.calibration
+        if flags is not None and rest is not None:
+            variance[part][flags] *= rest.calibration / motion.calibration
+    if not np.all(variance > 0.0):
+        broken = int(np.argmin(variance > 0.0))
+        raise DataError(f"the smoother breaks down: {motion.text}", f"sample {broken}", "choose another motion model")
     low_pass = motion.model == "random_walk" and not phi and not standing and (r.ndim == 0 or bool(np.all(r == r[0])))
     text = f"{motion.text}; at rest {rest.text}" if standing and rest is not None else motion.text
     if phi:

@@ -105,9 +105,9 @@ VG_INLINE void likelihood(const int n, const vg_statespace *s, const vg_measured
             continue;
         }
         squares += u.innovation * u.innovation / u.variance;
-        product *= u.variance;
+        product *= u.variance > 0.0 ? u.variance : NAN;
         count++;
-        if (!(product > 0x1p-200 && product < 0x1p200)) {
+        if (product < 0x1p-200 || product > 0x1p200) {
             int part;
             product = frexp(product, &part);
             exponent += part;

@@ -30,7 +30,8 @@ typedef struct {
     ptrdiff_t samples;
 } vg_measured;
 
-/* Innovations after the first `skip` of them: Σ v²/f, and Π f = product · 2^exponent over `count`. */
+/* Innovations after the first `skip` of them: Σ v²/f, and Π f = product · 2^exponent over `count`; product is NaN where
+   an f is not above zero. */
 typedef struct {
     double squares, product;
     int64_t exponent, count;
