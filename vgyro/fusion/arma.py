@@ -80,11 +80,16 @@ def _given(v: np.ndarray, theta: float, low_pass: LowPass) -> tuple[float, float
     """Σe², φ and the constant of least Σe², given θ."""
     now, before = low_pass(v[1:], -theta, 1.0, 0.0), low_pass(v[:-1], -theta, 1.0, 0.0)
     ones = low_pass(np.ones(len(v) - 1), -theta, 1.0, 0.0)
-    square, across, level = float(before @ before), float(before @ ones), float(ones @ ones)
-    right = np.array([float(before @ now), float(ones @ now)])
+    square, across, level = _dot(before, before), _dot(before, ones), _dot(ones, ones)
+    right = _dot(before, now), _dot(ones, now)
     determinant = square * level - across**2
-    phi = 0.0 if determinant <= 0 else float(right[0] * level - right[1] * across) / determinant
+    phi = 0.0 if determinant <= 0 else (right[0] * level - right[1] * across) / determinant
     phi = min(max(phi, -LARGEST), LARGEST)
-    constant = float(right[1] - phi * across) / level
+    constant = (right[1] - phi * across) / level
     errors = now - phi * before - constant * ones
-    return float(errors @ errors), phi, constant
+    return _dot(errors, errors), phi, constant
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> float:
+    # Not a BLAS product: its rounding depends on the number of threads.
+    return float(np.sum(a * b))
