@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pyarrow as pa
@@ -60,7 +60,7 @@ class Sample:
     status: np.ndarray
     model: WindowModels
     gyros: np.ndarray
-    place: dict[str, float]
+    place: dict[str, Any]
 
     @property
     def fitted(self) -> np.ndarray:
@@ -148,7 +148,7 @@ def engine_rows(array: ArraySeries, sample: Sample, dcc: Path, number: int) -> I
 
 def engine_sigma(sample: Sample, array: ArraySeries, *, dynamic: bool) -> float:
     """r.m.s. of the fused r_t after the window by the weights of DCC, or of CCC; deg/s."""
-    model, some = sample.model, np.ix_([0], sample.gyros)
+    model, some = sample.model, np.ix_(np.array([0]), sample.gyros)
     if len(sample.r) == sample.inside:
         return math.nan
     target = model.target[0][np.ix_(sample.gyros, sample.gyros)]

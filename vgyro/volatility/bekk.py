@@ -86,8 +86,9 @@ def fit_bekk(
 
     Conventions, as of GARCH and DCC: H_0 = r_0r_0' = S, so that H_1 = Ω + (aa' + bb')∘S; 1/T throughout; each gyro is
     divided by its own r.m.s. first; a_i² + b_i² < 1. With one gyro it is GARCH(1,1) with α = a², β = b². Several
-    starts, none of which depends on another window; the diagonal kind starts at the optimum of the scalar one. Where the best point gains less than 1e-6 a sample over the
-    constant covariance S, that is the answer: Ω = S, a = b = 0, status `boundary: a = 0`.
+    starts, none of which depends on another window; the diagonal kind starts at the optimum of the scalar one. Where
+    the best point gains less than 1e-6 a sample over the constant covariance S, that is the answer: Ω = S, a = b = 0,
+    status `boundary: a = 0`; the other boundaries are reached where any gyro's a and b lie there.
     The gradient is exact: the slopes of H_t are filtered backward as H_t is forward.
     Engle & Kroner (1995), Econometric Theory 11(1), 122-150, eq. 2.2 with K = 1; Liu et al. (2015) name it beside DCC.
     """
@@ -99,10 +100,8 @@ def fit_bekk(
     parameters = n * (n + 1) // 2 + (2 if kind == "scalar" else 2 * n)
     why = _unfit(r)
     if why:
-        nan = np.full(n, np.nan)
-        return BekkFit(
-            kind, np.full((n, n), np.nan), nan, nan, math.nan, np.full((len(r), n, n), np.nan), parameters, not free, why
-        )  # fmt: skip
+        none, nothing = np.full(n, np.nan), np.full((len(r), n, n), np.nan)
+        return BekkFit(kind, np.full((n, n), np.nan), none, none, math.nan, nothing, parameters, not free, why)
     scale = np.sqrt(np.mean(np.square(r), axis=0))
     model = _Likelihood(r / scale)
     root = np.linalg.cholesky(model.moment)

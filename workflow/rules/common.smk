@@ -322,7 +322,7 @@ def artefacts_of(wildcards):
             )
             paths += [f"{folder}/{table}.parquet" for table in tables]
             if has_volatility(dataset, recording):
-                paths.append(f"{folder}/effects.parquet")
+                paths += [f"{folder}/{table}.parquet" for table in ("effects", "bekk")]
                 parts = ("arch_lm", "garch", "dcc", "weights", "fits")
                 paths += [
                     f"{folder}/{name}/{part}.parquet"

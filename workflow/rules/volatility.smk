@@ -80,6 +80,30 @@ rule volatility:
         " --options {params.options:q} --code {params.code} --log {log}"
 
 
+rule bekk:
+    """CCC, DCC and both kinds of BEKK on a random sample of the rolling windows."""
+    input:
+        series="results/{dataset}/{recording}/{axis}/series.parquet",
+        garch=garch_of,
+        dcc=dcc_of,
+    output:
+        bekk="results/{dataset}/{recording}/{axis}/bekk.parquet",
+    log:
+        "results/logs/{dataset}/{recording}/{axis}/bekk.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/{axis}/bekk.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    params:
+        options=stage("board", "engine", "volatility", "crosscheck"),
+        code=code("bekk"),
+    shell:
+        "python -m vgyro.tasks.bekk --input series {input.series}"
+        " --input garch {input.garch:q} --input dcc {input.dcc:q} --output bekk {output.bekk}"
+        " --options {params.options:q} --code {params.code} --log {log}"
+
+
 rule effects:
     """What the ARCH effect of each gyro's level is: changing variance, drift, a tone, a knock, or nothing."""
     input:
