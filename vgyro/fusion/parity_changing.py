@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.fusion.parity_blocks import BlockMoments
-from vgyro.fusion.parity_hat import LEAST_SHARE, best_weights, outliers
+from vgyro.fusion.parity_hat import LEAST_SHARE, Best, best_weights, outliers
 from vgyro.fusion.parity_memory import Memory, chosen_memory
 
 PASSES = 3
@@ -79,19 +79,34 @@ def _settled(
     return square
 
 
+def residual_means(
+    moments: BlockMoments, variance: np.ndarray, used: np.ndarray, correlation: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """Means [M, N], deg/s, of the residual of each block less its slow part; variance, used [M, N]."""
+    best = best_weights(variance, moments.excluded, correlation)
+    mean = moments.residual(best.weights)[1]
+    return mean - _slow_part(moments, best, variance, used, mean)[0]
+
+
 def _squares(moments: BlockMoments, variance: np.ndarray, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
     """Mean squares [M, N] of the gyros' noise, (deg/s)², without bias where `variance` [M, N] is theirs.
 
-    Residual against the best estimate less its slow part, which is the mean of the blocks about it, by their variances;
-    what the estimate and the slow part took of it is added (see parity_hat).
+    Residual against the best estimate, less its slow part; what these two took of it is added (see parity_hat).
     """
     best = best_weights(variance, moments.excluded, correlation)
     square, mean = moments.residual(best.weights)
+    slow, lost = _slow_part(moments, best, variance, used, mean)
+    return np.maximum(square - 2.0 * mean * slow + slow**2, 0.0) + best.variance[:, None] + lost
+
+
+def _slow_part(
+    moments: BlockMoments, best: Best, variance: np.ndarray, used: np.ndarray, mean: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Mean of the residuals' means [M, N] over the blocks about each, by their variances; and the variance it takes."""
     rest = np.maximum(variance - best.variance[:, None], 1e-6 * variance)
     sure = np.where(used, moments.size[:, None] / rest, 0.0)
     mass = moments.window_sum(sure)
     some = mass > 1e-9 * sure.max(axis=0)
     mass = np.where(some, mass, 1.0)
     slow = np.where(some, moments.window_sum(sure * mean) / mass, 0.0)
-    less = np.maximum(square - 2.0 * mean * slow + slow**2, 0.0)
-    return less + best.variance[:, None] + np.where(some, np.minimum(1.0 / mass, rest), 0.0)
+    return slow, np.where(some, np.minimum(1.0 / mass, rest), 0.0)

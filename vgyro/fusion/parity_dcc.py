@@ -13,8 +13,8 @@ from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.parity import Variances, known_correlation
 from vgyro.fusion.parity_blocks import block_moments
-from vgyro.fusion.parity_changing import Changing, changing_variances
-from vgyro.fusion.parity_hat import constant_variances
+from vgyro.fusion.parity_changing import changing_variances, residual_means
+from vgyro.fusion.parity_hat import constant_variances, parity_deviance
 from vgyro.fusion.parity_memory import TIME_CONSTANTS_S, LowPass
 
 BURN_IN = 16
@@ -25,7 +25,7 @@ SIGNIFICANT = 2.0
 
 @dataclass(frozen=True)
 class Score:
-    """Forecasts compared by QLIKE, x/h + log h, x: square, h: forecast; the mean over gyros and blocks, less is better.
+    """Forecasts compared by the mean deviance of the differences between the gyros (QLIKE of a vector); less is better.
 
     prefer    : DCC is better, by more than two standard errors
     t         : of Diebold & Mariano, above zero where DCC is better; NaN: they could not be compared
@@ -46,11 +46,11 @@ def prefer_dcc(
 ) -> Score:  # fmt: skip
     """Do the data support DCC against the EWMA? Test of Diebold & Mariano (1995, J. Bus. Econ. Stat. 13, 253-263).
 
-    Both forecast the squares of the block means that DCC was made for: those of the residual against the array's own
-    estimate, without bias (parity), which know no motion. The forecast of EWMA for a block is the mean of the blocks
-    before, with the gyro's time constant of `variances`; where that is of change points alone, with the best one.
-    Standard error of the mean difference: Newey & West (1987), lag ∛M. Squares know h but for noise, and QLIKE ranks
-    forecasts as h itself would (Patton 2011, J. Econometrics 160, 246-256).
+    Both forecast the variances of the block means that DCC was made for. Judged is the likelihood of the differences
+    between the gyros, less their slow part, at these variances: it knows no motion, and the true variances have the
+    best on average, whatever was used to find the slow part (Patton 2011, J. Econometrics 160, 246-256). The forecast
+    of EWMA for a block is the mean of the blocks before, with the gyro's time constant of `variances`; where that is
+    of change points alone, with the best one. Standard error of the mean difference: Newey & West (1987), lag ∛M.
     """
     deviations = array.deviations.get((model, mode, definition))
     if deviations is None:
@@ -73,7 +73,23 @@ def prefer_dcc(
             )
         ]
     )
-    return _compared(found, ewma, forecast)
+    used = found.freedom > 0
+    residual = residual_means(moments, found.variance, used, correlation)
+    missing = ~used & ~moments.excluded
+    good = _positive(ewma) & _positive(forecast) & ~missing | moments.excluded
+    rows = good.all(axis=1) & ((~moments.excluded).sum(axis=1) > 1)
+    if rows.sum() < FEWEST_BLOCKS:
+        return _nothing(f"fewer than {FEWEST_BLOCKS} blocks have a forecast of both")
+    excluded = moments.excluded[rows]
+    of_dcc, of_ewma = (
+        parity_deviance(residual[rows], np.where(excluded, 1.0, one[rows]), excluded, correlation)
+        for one in (forecast, ewma)
+    )
+    return _compared(of_dcc, of_ewma)
+
+
+def _positive(variance: np.ndarray) -> np.ndarray:
+    return np.isfinite(variance) & (variance > 0)
 
 
 def _block_means(
@@ -122,24 +138,18 @@ def _mean_before(square: np.ndarray, freedom: np.ndarray, keep: float, low_pass:
 
 
 def _loss(square: np.ndarray, forecast: np.ndarray) -> np.ndarray:
-    good = np.isfinite(forecast) & (forecast > 0)
+    good = _positive(forecast)
     h = np.where(good, forecast, 1.0)
     return np.where(good, square / h + np.log(h), np.nan)
 
 
-def _compared(found: Changing, ewma: np.ndarray, dcc: np.ndarray) -> Score:
-    losses = [np.where(found.freedom > 0, _loss(found.square, one), np.nan) for one in (dcc, ewma)]
-    both = np.isfinite(losses[0]) & np.isfinite(losses[1])
-    rows = both.any(axis=1)
-    if rows.sum() < FEWEST_BLOCKS:
-        return _nothing(f"fewer than {FEWEST_BLOCKS} blocks have a forecast of both")
-    of_dcc, of_ewma = (
-        np.where(both, one, 0.0)[rows].sum(axis=1) / both[rows].sum(axis=1) for one in losses
-    )  # fmt: skip
+def _compared(of_dcc: np.ndarray, of_ewma: np.ndarray) -> Score:
     better = of_ewma - of_dcc
     error = _standard_error(better)
     t = float(better.mean() / error) if error > 0 else 0.0
-    text = f"QLIKE {of_dcc.mean():.4f} of DCC, {of_ewma.mean():.4f} of EWMA, t = {t:.1f} over {len(better)} blocks"
+    text = (
+        f"mean deviance {of_dcc.mean():.4f} of DCC, {of_ewma.mean():.4f} of EWMA, t = {t:.1f} over {len(better)} blocks"
+    )
     return Score(t > SIGNIFICANT, t, float(of_dcc.mean()), float(of_ewma.mean()), len(better), text)
 
 

@@ -22,7 +22,8 @@ LEAST_SHARE = 1e-3
 """Least variance, as a share of the median over the gyros."""
 START_SHARE = 0.02
 FAR = 16.0
-"""A block whose square is so many times the largest of the eight blocks about it is an outlier."""
+FAR_FROM_MEAN = 25.0
+"""A block whose square is so many times the largest of the eight blocks about it, and the mean, is an outlier."""
 NEIGHBOURS = 4
 
 
@@ -79,6 +80,26 @@ def best_weights(variance: np.ndarray, excluded: np.ndarray, correlation: np.nda
     return Best(weights, total)
 
 
+def parity_deviance(
+    residual: np.ndarray, variance: np.ndarray, excluded: np.ndarray, correlation: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """-2 log likelihood [M] of the differences between the gyros, each block one sample, but for constants.
+
+    log|R| + log(1'R⁻¹1) + e'(R⁻¹ - R⁻¹11'R⁻¹/(1'R⁻¹1))e of the gyros that are not excluded: what is common to the rows
+    of residual e [M, N], deg/s, changes nothing. variance [M, N] (deg/s)²: R = σσ'∘C.
+    """
+    deviance = np.empty(len(residual))
+    sigma = np.sqrt(variance)
+    for pattern, rows in patterns(excluded):
+        kept = np.flatnonzero(~pattern)
+        inverse = np.linalg.inv(correlation[np.ix_(kept, kept)])
+        scaled, ones = (residual / sigma)[np.ix_(rows, kept)], 1.0 / sigma[np.ix_(rows, kept)]
+        mass, cross = np.sum((ones @ inverse) * ones, axis=1), np.sum((ones @ inverse) * scaled, axis=1)
+        square = np.sum((scaled @ inverse) * scaled, axis=1) - cross**2 / mass
+        deviance[rows] = square + np.log(mass) - 2.0 * np.log(ones).sum(axis=1)
+    return deviance
+
+
 def patterns(excluded: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """The different rows of excluded [M, N], and the numbers of the blocks that have each; all of a row: none of it."""
     if not excluded.any():
@@ -108,12 +129,13 @@ def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[
 
 
 def outliers(square: np.ndarray) -> np.ndarray:
-    """Single blocks far above all of their neighbours: [M, N] of squares [M, N]."""
+    """Single blocks far above all of their neighbours and the mean: [M, N] of squares [M, N]; zero: not known."""
     around = np.zeros_like(square)
     for shift in range(1, NEIGHBOURS + 1):
         around[shift:] = np.maximum(around[shift:], square[:-shift])
         around[:-shift] = np.maximum(around[:-shift], square[shift:])
-    return (around > 0) & (square > FAR * around)
+    mean = square.sum(axis=0) / np.maximum((square > 0).sum(axis=0), 1)
+    return (around > 0) & (square > FAR * around) & (square > FAR_FROM_MEAN * mean)
 
 
 def _without_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
