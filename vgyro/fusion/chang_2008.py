@@ -20,6 +20,7 @@ INFERRED = (
 )
 LEVEL_2 = "level 2 needs three axes, accelerometers and magnetometers: not run"
 LOWEST_HZ = 1e-9
+ROUNDING = 1e-12
 
 
 def chang_2008(array: ArrayRates, parameters: FilterParameters, start_s: float = math.inf) -> Fused:
@@ -70,7 +71,8 @@ def _described(rate: np.ndarray, found: Modes, q: float, array: ArrayRates) -> F
     noise_bandwidth = array.rate_hz / 2.0 * float(pairs.sum()) / dc**2
     delay = array.period * float(np.sum(height * keep / gain)) / dc
     bandwidth = _bandwidth(height, gain, array.rate_hz)
-    notes = [f"q = {q:.4g} deg²/s³", f"gain for a constant rate 1 - {1.0 - dc:.2g}", LEVEL_2, array.noise.rrw_note]
+    lost = f" - {1.0 - dc:.2g}" if 1.0 - dc > ROUNDING else ""
+    notes = [f"q = {q:.4g} deg²/s³", f"gain for a constant rate 1{lost}", LEVEL_2, array.noise.rrw_note]
     note = "; ".join(text for text in notes if text)
     return Fused(rate, slow / dc, dc, bandwidth, noise_bandwidth, delay, note)
 
