@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from harness import Case
+from harness import Case, error_sd
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter, ss2tf
@@ -19,13 +19,45 @@ def average_kf(one: Case) -> np.ndarray:
 
     It is given the true mean variance of the average's noise. Steady state: Riccati equation by scipy.
     """
-    average = one.array.rate.mean(axis=1)
-    variance = float(one.variance.mean(axis=0).sum()) / one.array.rate.shape[1] ** 2
+    average, variance = _average(one)
+    return _filter(average, variance, _likeliest(average, variance, one.array.period), one.array.period)[1]
+
+
+def earlier_study(one: Case) -> dict[str, float]:
+    """Error s.d. of the smoothers of docs/methods.md, deg/s: the rate's derivative is a random walk, q by
+    the likelihood of the filter with the mean variance. True variances are given; fixed ones are means of them.
+    """
+    average, variance = _average(one)
+    median = np.median(one.array.rate, axis=1)
+    of_median = np.full(len(median), np.var(median - one.truth))
+    fixed = one.variance.mean(axis=0)
+    u = 1.0 / fixed / (1.0 / fixed).sum()
+    known, r = known_weights(one)
+    series = {
+        "average": (average, np.full(len(average), variance)),
+        "median": (median, of_median),
+        "fixed variances": (one.array.rate @ u, np.full(len(average), float(u**2 @ fixed))),
+        "oracle": (known, r),
+    }
+    found = {"average + KF": error_sd(one, average_kf(one))}
+    for name, (z, each) in series.items():
+        q = _likeliest(z, float(each.mean()), one.array.period)
+        found[name] = error_sd(one, _smoothed(z, each, q, one.array.period))
+    return found
+
+
+def _average(one: Case) -> tuple[np.ndarray, float]:
+    gyros = one.array.rate.shape[1]
+    return one.array.rate.mean(axis=1), float(one.variance.mean(axis=0).sum()) / gyros**2
+
+
+def _likeliest(z: np.ndarray, r: float, period: float) -> float:
+    """q of the greatest likelihood, deg²/s⁵."""
     found = minimize_scalar(
-        lambda log_q: -_filter(average, variance, math.exp(log_q), one.array.period)[0],
+        lambda log_q: -_filter(z, r, math.exp(log_q), period)[0],
         bounds=(-5.0, 18.0), method="bounded", options={"xatol": 0.01},
     )  # fmt: skip
-    return _filter(average, variance, math.exp(found.x), one.array.period)[1]
+    return math.exp(found.x)
 
 
 def _filter(z: np.ndarray, r: float, q: float, period: float) -> tuple[float, np.ndarray]:
@@ -41,6 +73,30 @@ def _filter(z: np.ndarray, r: float, q: float, period: float) -> tuple[float, np
     innovation = z - predicted
     squares = float((innovation[SETTLED:] ** 2).sum())
     return -0.5 * squares / S - 0.5 * (len(z) - SETTLED) * math.log(S), predicted + K[0, 0] * innovation
+
+
+def _smoothed(z: np.ndarray, r: np.ndarray, q: float, period: float) -> np.ndarray:
+    """Smoothed rate [T] for variances r [T]: Kalman filter, and the smoother of Bryson & Frazier, for two states."""
+    samples, noise, seen = len(z), r.tolist(), z.tolist()
+    q00, q01, q11 = q * period**3 / 3, q * period**2 / 2, q * period
+    rate, slope = seen[0], 0.0
+    p00, p01, p11 = 1e4, 0.0, 1e6
+    kept = []
+    for k in range(samples):
+        S = p00 + noise[k]
+        g0, g1, e = p00 / S, p01 / S, seen[k] - rate
+        kept.append((rate, p00, p01, e / S, g0, g1))
+        rate, slope = rate + g0 * e + period * (slope + g1 * e), slope + g1 * e
+        p11 -= g1 * p01
+        p00, p01 = p00 * (1 - g0), p01 * (1 - g0)
+        p00, p01, p11 = p00 + 2 * period * p01 + period**2 * p11 + q00, p01 + period * p11 + q01, p11 + q11
+    smoothed, a0, a1 = np.empty(samples), 0.0, 0.0
+    for k in range(samples - 1, -1, -1):
+        rate, p00, p01, weighted, g0, g1 = kept[k]
+        a1 += period * a0
+        a0 += weighted - g0 * a0 - g1 * a1
+        smoothed[k] = rate + p00 * a0 + p01 * a1
+    return smoothed
 
 
 def known_weights(one: Case) -> tuple[np.ndarray, np.ndarray]:
@@ -61,17 +117,6 @@ def oracle(one: Case) -> np.ndarray:
     rate_hz, segment = one.array.rate_hz, one.array.segment
     motion = choose_motion(z, r, segment, rate_hz, models=one.parameters.motion_models)
     return smooth(z, r, segment, rate_hz, motion).rate
-
-
-def smoothed_average(one: Case) -> np.ndarray:
-    """The average, smoothed; it is given the true mean variance of its noise [T]."""
-    from vgyro.fusion.smoother import choose_motion, smooth
-
-    average = one.array.rate.mean(axis=1)
-    r = np.full(len(average), float(one.variance.mean(axis=0).sum()) / one.array.rate.shape[1] ** 2)
-    rate_hz, segment = one.array.rate_hz, one.array.segment
-    motion = choose_motion(average, r, segment, rate_hz, models=one.parameters.motion_models)
-    return smooth(average, r, segment, rate_hz, motion).rate
 
 
 def wiener_sd(one: Case, motion_sd: float, bandwidth_hz: float) -> float:
