@@ -37,18 +37,21 @@ def changing_variances(
     """Follow the variances through the blocks, from the constant ones [N] and their outlying blocks [M, N] on.
 
     Each pass takes the residual against the estimate with the weights of the pass before. These come from variances
-    that do not know the block's own square, so that no gyro is favoured for a square that was small by chance.
+    that do not know the block's own square, so that no gyro is favoured for a square that was small by chance. The last
+    pass keeps the memories of the one before.
     """
     alone = np.broadcast_to(constant, moments.excluded.shape)
     known = ~moments.excluded & ((~moments.excluded).sum(axis=1) > 1)[:, None]
     low_pass = engines.get(engine).kalman.low_pass
-    for _ in range(PASSES):
+    memories: list[Memory] = []
+    for number in range(PASSES):
         square = _squares(moments, alone, known & ~outlier, correlation)
         square = _settled(moments, square, alone, outlier | outliers(np.where(known, square, 0.0)), correlation)
         outlier = outliers(np.where(known, square, 0.0))
         freedom = np.where(known & ~outlier, moments.size[:, None].astype(float), 0.0)
         columns = list(zip(square.T, freedom.T, strict=True))
-        memories = [chosen_memory(*one, block_s, low_pass) for one in columns]
+        if number < PASSES - 1:
+            memories = [chosen_memory(*one, block_s, low_pass) for one in columns]
         found = [memory.average(*one, low_pass) for memory, one in zip(memories, columns, strict=True)]
         variance, alone = (np.column_stack([one[place] for one in found]) for place in (0, 1))
         # An outlier has the variance that it shows, and lends it to no other block.

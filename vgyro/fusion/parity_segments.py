@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, insort
-from itertools import pairwise
 
 import numpy as np
 
@@ -51,18 +50,34 @@ class _Sums:
         self.freedom = np.concatenate([[0.0], np.cumsum(freedom)])
         self.square = np.concatenate([[0.0], np.cumsum(freedom * square)])
 
-    def cost(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """n·log s of blocks [first, last); infinite where there are too few."""
-        number, total = self.freedom[last] - self.freedom[first], self.square[last] - self.square[first]
-        enough = (number >= FEWEST_VALUES * (1 - 1e-9)) & (total > 0)
-        ratio = np.where(enough, total, 1.0) / np.where(enough, number, 1.0)
-        return np.where(enough, number * np.log(ratio), np.inf)
-
     def gain(self, first: np.ndarray, place: np.ndarray, last: np.ndarray) -> np.ndarray:
         """What a change at `place` brings in [first, last); -infinite where a side is too short."""
-        whole = self.cost(first, last)
-        parts = self.cost(first, place) + self.cost(place, last)
-        return np.where(np.isfinite(parts), np.where(np.isfinite(whole), whole, 0.0) - parts, -np.inf)
+        n, s = ([total[one] for one in (first, place, last)] for total in (self.freedom, self.square))
+        whole = _cost(n[2] - n[0], s[2] - s[0])
+        # A whole that is too short has no cost of its own, and no place that is good.
+        whole[whole == np.inf] = 0.0
+        return whole - _cost(n[1] - n[0], s[1] - s[0]) - _cost(n[2] - n[1], s[2] - s[1])
+
+    def best(self, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Best place of one change in each of the segments [first, last), of two blocks or more, and what it brings."""
+        inner = last - first - 1
+        begin = np.cumsum(inner) - inner
+        which = np.repeat(np.arange(len(first)), inner)
+        place = np.arange(len(which)) - begin[which] + first[which] + 1
+        gain = self.gain(first[which], place, last[which])
+        most = np.maximum.reduceat(gain, begin)
+        hits = np.flatnonzero(gain == most[which])
+        hits = hits[np.searchsorted(which[hits], np.arange(len(first)))]
+        return place[hits], most
+
+
+def _cost(number: np.ndarray, total: np.ndarray) -> np.ndarray:
+    """n·log s of segments of Σ freedom = n and Σ freedom·square = total; infinite where there is too little."""
+    short = (number < FEWEST_VALUES * (1 - 1e-9)) | (total <= 0)
+    number = np.maximum(number, 1.0)
+    cost = np.asarray(number * np.log(np.where(short, 1.0, total) / number))
+    cost[short] = np.inf
+    return cost
 
 
 def _candidates(sums: _Sums, penalty: float) -> list[tuple[int, int, int]]:
@@ -90,26 +105,21 @@ def _candidates(sums: _Sums, penalty: float) -> list[tuple[int, int, int]]:
 
 def _split(sums: _Sums, points: np.ndarray, penalty: float) -> np.ndarray:
     """With one change more in each segment where that is worth its penalty."""
-    edges = [0, *points.tolist(), len(sums.freedom) - 1]
-    more = []
-    for low, high in pairwise(edges):
-        if high - low < 2:
-            continue
-        place = np.arange(low + 1, high)
-        gain = sums.gain(np.array(low), place, np.array(high))
-        if gain.max() > penalty:
-            more.append(int(place[int(gain.argmax())]))
-    return np.array(sorted([*points.tolist(), *more]), dtype=np.int64)
+    edges = np.concatenate([[0], points, [len(sums.freedom) - 1]])
+    wide = np.flatnonzero(np.diff(edges) > 1)
+    if len(wide) == 0:
+        return points
+    place, gain = sums.best(edges[wide], edges[wide + 1])
+    return np.sort(np.concatenate([points, place[gain > penalty]]))
 
 
 def _moved(sums: _Sums, points: np.ndarray) -> np.ndarray:
-    """Each change at its best place between its neighbours, one after the other."""
+    """Each change at its best place between its neighbours: first every other one, then those between."""
     edges = np.concatenate([[0], points, [len(sums.freedom) - 1]])
-    for number in range(1, len(edges) - 1):
-        low, high = int(edges[number - 1]), int(edges[number + 1])
-        place = np.arange(low + 1, high)
-        gain = sums.gain(np.array(low), place, np.array(high))
-        edges[number] = place[int(gain.argmax())]
+    for turn in (1, 2):
+        these = np.arange(turn, len(edges) - 1, 2)
+        if len(these):
+            edges[these] = sums.best(edges[these - 1], edges[these + 1])[0]
     return edges[1:-1]
 
 
