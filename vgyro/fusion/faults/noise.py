@@ -1,0 +1,142 @@
+"""More noise than usual: for long (noise) or for a short time (burst), from the variances of the blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.fusion.faults.candidate import Candidate, best_interval, lengths_up_to, running_sum, spread
+from vgyro.fusion.faults.residuals import Residuals
+
+LEAST_LONG = 1.25
+LEAST_SHORT = 2.0
+SHORT_S = 60.0
+"""Least ratios of the standard deviation to the usual one, for hours and for SHORT_S or less: the noise of a healthy
+gyro comes in clusters, too, the higher the shorter they are."""
+LOW_SHARE = 0.15
+LOW_PLACE = 1.036
+"""So many standard deviations above its 15 % quantile lies the median of a normal variable."""
+APART = 64
+"""Blocks between two windows whose noise no longer depends on each other's (GARCH noise of α + β = 0.95: 4 %)."""
+FEWEST_WINDOWS = 16
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """Log-variance of one gyro's residual over its usual one.
+
+    level  : [B] of log S² less what is usual, 0 in blocks that do not count
+    counts : [B] the block counts
+    spread : length of a window in blocks → standard deviation of the mean of `level` over it, in health
+    share  : part of the usual variance that is the gyro's own
+    """
+
+    level: np.ndarray
+    counts: np.ndarray
+    spread: dict[int, float]
+    share: float
+
+
+def noise_level(found: Residuals, gyro: int, counts: np.ndarray) -> NoiseLevel:
+    """The log-variances, their usual level and how far it wanders by itself.
+
+    counts : [B], false where something else than noise is known to be wrong
+    The usual level is found from below, for the fault may last for most of the recording; how far it wanders, from
+    differences between windows far apart, most of which no single change falls between. In motion the residual grows
+    by a share of the motion that belongs to the array, not to a fault: scale factors, axes and clocks differ a little.
+    """
+    variance, expected = found.variance[:, gyro], found.expected[:, gyro]
+    counts = counts & np.isfinite(variance) & (variance > 0)
+    level = np.zeros(len(variance))
+    if not counts.any():
+        return NoiseLevel(level, counts, {}, 1.0)
+    level[counts] = np.log(variance[counts] / expected[counts])
+    usual = _usual(level[counts])
+    usual_variance = expected * np.exp(usual)
+    leak = _leak(found, gyro, counts, usual_variance)
+    level[counts] -= np.log1p(leak * found.energy[counts, gyro] / usual_variance[counts])
+    level[counts] -= _usual(level[counts])
+    level = np.where(counts, level, 0.0)
+    share = float(np.median(found.sigma2[gyro] / expected))
+    return NoiseLevel(level, counts, _spreads(level[counts], len(level)), share)
+
+
+def _usual(level: np.ndarray) -> float:
+    apart = max(1, min(APART, len(level) // 8))
+    scatter = spread(level[apart:] - level[:-apart]) / np.sqrt(2.0) if len(level) > 2 * apart else spread(level)
+    return float(min(np.quantile(level, LOW_SHARE) + LOW_PLACE * scatter, np.median(level)))
+
+
+def _leak(found: Residuals, gyro: int, counts: np.ndarray, usual: np.ndarray) -> float:
+    """Share of the motion's variance that is usual in the residual."""
+    moving = counts & found.moving
+    if moving.sum() < FEWEST_WINDOWS:
+        return 0.0
+    excess = (found.variance[moving, gyro] - usual[moving]) / found.energy[moving, gyro]
+    return float(max(np.median(excess), 0.0))
+
+
+def _spreads(level: np.ndarray, blocks: int) -> dict[int, float]:
+    """Standard deviation of window means, in health, for every length of window."""
+    sums, found = running_sum(level), dict[int, float]()
+    floor = 0.0
+    for length in lengths_up_to(blocks):
+        means = (sums[length:] - sums[:-length]) / length
+        apart = length + min(APART, max(1, len(level) // 8))
+        if len(means) > apart + FEWEST_WINDOWS * length or length == 1:
+            lagged = means[apart:] - means[:-apart] if len(means) > apart + FEWEST_WINDOWS else means - np.median(means)
+            floor = max(spread(lagged) / np.sqrt(2.0), floor / np.sqrt(2.0), 1e-6)
+        else:
+            # Too few windows: at best the blocks add up as if they were independent.
+            floor /= np.sqrt(2.0)
+        found[length] = floor
+    return found
+
+
+def least_ratio(seconds: float) -> float:
+    """Least ratio of a fault of that length."""
+    return LEAST_LONG + (LEAST_SHORT - LEAST_LONG) * min(1.0, SHORT_S / seconds)
+
+
+def suspect_noise(state: NoiseLevel, gyro: int, block_s: float, burst_s: float, threshold: float) -> Candidate | None:
+    """The window in which the noise is farthest above the usual, its ends by maximum likelihood; None: in none.
+
+    block_s : length of a block, s;  burst_s : a shorter event is a burst
+    The evidence is the mean log-variance of the window over its standard deviation in health.
+    """
+    sums, usable = running_sum(state.level), running_sum(state.counts)
+    best: tuple[float, int, int] | None = None
+    for length, scatter in state.spread.items():
+        if length > len(state.level) // 2 and length > 1:
+            break
+        means = (sums[length:] - sums[:-length]) / np.maximum(usable[length:] - usable[:-length], 0.5 * length)
+        place = int(np.argmax(means))
+        if ratio_of(means[place], state.share) < least_ratio(length * block_s):
+            continue
+        evidence = float(means[place]) / scatter
+        if evidence >= threshold and (best is None or evidence > best[0]):
+            best = evidence, place, place + length
+    if best is None:
+        return None
+    evidence, first, last = best
+    # What is below the usual counts as usual: only an increase is looked for.
+    first, last = best_interval(sums, first, last)
+    while last < len(state.counts) and not state.counts[last]:
+        last += 1
+    number = max(usable[last] - usable[first], 1.0)
+    mean = float(sums[last] - sums[first]) / number
+    length = 1 << int(np.log2(number))
+    evidence = max(evidence, mean / state.spread[length] * np.sqrt(number / length))
+    ratio, seconds = ratio_of(mean, state.share), (last - first) * block_s
+    if ratio < least_ratio(seconds):
+        return None
+    return Candidate(gyro, "burst" if seconds < burst_s else "noise", first, last, evidence, ratio, "1")
+
+
+def ratio_of(level: float, share: float) -> float:
+    """Ratio of the gyro's own standard deviation to the usual one, from the log-variance of its residual.
+
+    share : of the gyro's own noise in the usual variance of the residual
+    """
+    return float(np.sqrt(max(1.0 + (np.exp(level) - 1.0) / share, 0.0)))

@@ -1,0 +1,146 @@
+"""Residuals: each gyro against the others, in means and in variances of blocks, while some gyros are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.fusion.faults.block_sums import BlockSums
+
+Span = tuple[int, int]
+"""Blocks [first, last)."""
+
+LEVEL_BLOCKS = 32
+LEAST_SHARE = 0.02
+IN_MOTION = 25.0
+"""A block moves where the motion's variance in it is so many times that of the noise of the combination."""
+
+
+@dataclass(frozen=True)
+class Spoilt:
+    """Blocks [first, last) in which a gyro is no part of the combination of the others."""
+
+    gyro: int
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Each gyro less the combination of the others.
+
+    mean     : [B, N] deg/s;  variance : [B, N] (deg/s)², of a sample in the block, of the residual
+    expected : [B, N] (deg/s)², the same where every gyro has its usual noise
+    motion   : [B, N] deg/s, mean of the others;  energy : [B, N] (deg/s)², variance of the others in the block
+    product  : [B, N] (deg/s)², covariance of the residual and the others in the block, the noise that is in both added
+    others   : [N] (deg/s)², variance of a sample of the others' combination
+    sigma2   : [N] (deg/s)², usual variance of a sample of each gyro
+    moving   : [B] the board moves in this block
+    """
+
+    mean: np.ndarray
+    variance: np.ndarray
+    expected: np.ndarray
+    motion: np.ndarray
+    energy: np.ndarray
+    product: np.ndarray
+    others: np.ndarray
+    sigma2: np.ndarray
+    moving: np.ndarray
+
+
+def usual_variance(sums: BlockSums) -> np.ndarray:
+    """Variance of a sample of each gyro [N], from the residuals against the average of the others.
+
+    The median over the blocks of c'Gc, c = (1, -1/(N-1), …), is σ_i² + Σ_{j≠i} σ_j²/(N-1)², which is solved for σ².
+    """
+    gyros = sums.gyros
+    mix = np.where(np.eye(gyros, dtype=bool), 1.0, -1.0 / (gyros - 1))
+    seen = np.median(np.einsum("ip,bpq,iq->bi", mix, sums.moment[:, :gyros, :gyros], mix, optimize=True), axis=0)
+    solved = np.linalg.solve(mix**2, seen)
+    return np.maximum(solved, LEAST_SHARE * np.median(seen))
+
+
+def residuals_of(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray, spoilt: Sequence[Spoilt]) -> Residuals:
+    """Residuals of every gyro against the inverse-variance combination of the others that are not spoilt.
+
+    gain : [B, N] sensitivity of each gyro, by which its rates are divided
+    A spoilt gyro is not just left out of the means: its bias would go with it, and the others would seem to jump. Its
+    mean is filled in so that its difference from the others goes straight from before to after.
+    """
+    blocks, gyros = len(sums), sums.gyros
+    weight = np.tile(1.0 / sigma2, (blocks, 1))
+    for one in spoilt:
+        weight[one.first : one.last, one.gyro] = 0.0
+    rate = (sums.mean[:, :gyros] + sums.mean[:, gyros:]) / gain
+    filled = _filled(rate, 1.0 / sigma2, spoilt)
+    total = weight.sum(axis=1)
+    everyone = 1.0 / sigma2
+    shape = (blocks, gyros)
+    mean, variance, expected, motion, energy, product = (np.empty(shape) for _ in range(6))
+    for gyro in range(gyros):
+        share = weight.copy()
+        share[:, gyro] = 0.0
+        left = total - weight[:, gyro]
+        share /= np.where(left > 0, left, 1.0)[:, None]
+        constant = everyone.copy()
+        constant[gyro] = 0.0
+        motion[:, gyro] = filled @ (constant / constant.sum())
+        mean[:, gyro] = rate[:, gyro] - motion[:, gyro]
+        of_others = np.column_stack([share / gain, (share / gain).sum(axis=1)])
+        of_residual = -of_others
+        of_residual[:, gyro] += 1.0 / gain[:, gyro]
+        of_residual[:, gyros] += 1.0 / gain[:, gyro]
+        carried = np.einsum("bpq,bq->bp", sums.moment, of_residual, optimize=True)
+        variance[:, gyro] = np.einsum("bp,bp->b", of_residual, carried)
+        noise = share**2 @ sigma2
+        expected[:, gyro] = sigma2[gyro] + noise
+        product[:, gyro] = np.einsum("bp,bp->b", of_others, carried) + noise
+        energy[:, gyro] = np.einsum("bp,bpq,bq->b", of_others, sums.moment, of_others, optimize=True)
+        variance[left == 0, gyro] = np.nan
+    others = np.array([1.0 / (everyone.sum() - one) for one in everyone])
+    moving = np.median(energy, axis=1) > IN_MOTION * np.median(others)
+    return Residuals(mean, variance, expected, motion, energy, product, others, sigma2, moving)
+
+
+def _filled(rate: np.ndarray, weight: np.ndarray, spoilt: Sequence[Spoilt]) -> np.ndarray:
+    """Means of the gyros [B, N] with spoilt ones replaced."""
+    if not spoilt:
+        return rate
+    filled, blocks = rate.copy(), len(rate)
+    bad = np.zeros(rate.shape, dtype=bool)
+    for one in spoilt:
+        bad[one.first : one.last, one.gyro] = True
+    for first, last, gyro in _joined(spoilt):
+        around = slice(max(0, first - LEVEL_BLOCKS), min(blocks, last + LEVEL_BLOCKS))
+        usable = ~bad[around].any(axis=0)
+        if not usable.any():
+            usable = ~bad[first:last].any(axis=0)
+        usable[gyro] = False
+        if not usable.any():
+            usable = np.arange(rate.shape[1]) != gyro
+        share = np.where(usable, weight, 0.0)
+        others = rate[around] @ (share / share.sum())
+        own = np.where(bad[around, gyro], np.nan, rate[around, gyro] - others)
+        before, after = own[: first - around.start], own[last - around.start :]
+        levels = [np.median(part[~np.isnan(part)]) if (~np.isnan(part)).any() else np.nan for part in (before, after)]
+        begin, end = (levels[0], levels[1]) if np.isfinite(levels).all() else (np.nanmax([*levels, -np.inf]),) * 2
+        if not np.isfinite(begin):
+            begin = end = float(np.median(rate[:, gyro] - rate @ (share / share.sum())))
+        inside = slice(first - around.start, last - around.start)
+        filled[first:last, gyro] = others[inside] + np.linspace(begin, end, last - first)
+    return filled
+
+
+def _joined(spoilt: Sequence[Spoilt]) -> list[tuple[int, int, int]]:
+    """(first, last, gyro) of the spoilt stretches, those of a gyro that touch as one."""
+    found: list[tuple[int, int, int]] = []
+    for one in sorted(spoilt, key=lambda one: (one.gyro, one.first)):
+        if found and found[-1][2] == one.gyro and one.first <= found[-1][1]:
+            first, last, gyro = found[-1]
+            found[-1] = (first, max(last, one.last), gyro)
+        else:
+            found.append((one.first, one.last, one.gyro))
+    return found

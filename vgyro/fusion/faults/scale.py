@@ -1,0 +1,107 @@
+"""Changes of a scale factor, seen where the board moves: the residual is in proportion to the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vgyro.fusion.faults.block_sums import BlockSums
+from vgyro.fusion.faults.candidate import Candidate, lengths_up_to, running_sum, spread
+from vgyro.fusion.faults.residuals import Residuals
+
+LEAST_CHANGE = 0.003
+"""Smaller changes of the sensitivity are what calibrations leave over."""
+FEWEST_BLOCKS = 8
+FEWEST_WINDOWS = 16
+ROUNDS = 4
+EDGE = 2  # blocks
+EARLY = 0.05
+"""A change in so early a part of the motion ends a fault rather than begins one."""
+
+
+def _parts(sums: BlockSums, found: Residuals, gyro: int) -> tuple[np.ndarray, np.ndarray]:
+    """Numerator and denominator [B] of the slope of the residual against the motion, block by block, samples' worth.
+
+    Inside the block, and from one block to the next of the same run, where a bias cancels.
+    """
+    top = sums.count * found.product[:, gyro]
+    bottom = sums.count * found.energy[:, gyro]
+    same = np.diff(sums.run) == 0
+    pair = 0.5 * np.minimum(sums.count[1:], sums.count[:-1]) * same
+    top[1:] += pair * np.diff(found.mean[:, gyro]) * np.diff(found.motion[:, gyro])
+    bottom[1:] += pair * np.diff(found.motion[:, gyro]) ** 2
+    still = ~found.moving
+    top[still] = bottom[still] = 0.0
+    return top, bottom
+
+
+def usual_slope(sums: BlockSums, found: Residuals, gyro: int, counts: np.ndarray) -> float:
+    """Slope of the residual against the motion that is usual in this recording: a constant error of the scale.
+
+    counts : [B], false where something is known to be wrong
+    """
+    top, bottom = _parts(sums, found, gyro)
+    moving = (bottom > 0) & counts
+    if moving.sum() < FEWEST_BLOCKS:
+        return 0.0
+    slope, weight = top[moving] / bottom[moving], bottom[moving]
+    order = np.argsort(slope)
+    heap = np.cumsum(weight[order])
+    return float(slope[order][np.searchsorted(heap, 0.5 * heap[-1])])
+
+
+def slope_in(sums: BlockSums, found: Residuals, gyro: int, first: int, last: int) -> float:
+    """Slope of the residual against the motion in blocks [first, last); 0 without motion."""
+    top, bottom = _parts(sums, found, gyro)
+    return float(top[first:last].sum() / bottom[first:last].sum()) if bottom[first:last].any() else 0.0
+
+
+def suspect_scale(
+    sums: BlockSums, found: Residuals, gyro: int, counts: np.ndarray, local: np.ndarray, threshold: float
+) -> Candidate | None:
+    """The window in which the slope differs most from the usual; None: in none.
+
+    counts : [B], false where something else is known to be wrong;  local : [B] variance of a sample of the residual
+    The evidence is the slope over its standard error, from the noise or from how much it varies in health.
+    """
+    top, bottom = _parts(sums, found, gyro)
+    top, bottom = np.where(counts, top, 0.0), np.where(counts, bottom, 0.0)
+    moving = np.flatnonzero(bottom > 0)
+    if len(moving) < 2 * FEWEST_BLOCKS:
+        return None
+    # Blocks at rest know nothing of the scale: windows are of moving blocks alone.
+    x, w = top[moving] / np.sqrt(local[moving]), bottom[moving] / local[moving]
+    sx, sw = running_sum(x / np.sqrt(local[moving])), running_sum(w)
+    best: tuple[float, int, int] | None = None
+    for length in lengths_up_to(len(moving) // 2)[2:]:
+        weight = sw[length:] - sw[:-length]
+        score = (sx[length:] - sx[:-length]) / np.sqrt(weight)
+        excess = spread(score) if len(score) > FEWEST_WINDOWS * length else 1.0
+        score /= max(excess, 1.0)
+        enough = np.abs(sx[length:] - sx[:-length]) / weight >= LEAST_CHANGE
+        place = int(np.argmax(np.abs(score) * enough))
+        evidence = float(abs(score[place]) * enough[place])
+        if evidence >= threshold and (best is None or evidence > best[0]):
+            best = evidence, place, place + length
+    if best is None:
+        return None
+    first, last = _ends(sx, sw, best[1], best[2])
+    size = float((sx[last] - sx[first]) / (sw[last] - sw[first]))
+    if first <= EDGE and EARLY * len(moving) < last < len(moving) - EDGE:
+        # The usual slope is that of the longer part; the earlier part is the one without the fault.
+        first, last, size = last, len(moving), -size / (1.0 + size)
+    end = len(sums) if last >= len(moving) - EDGE else int(moving[last - 1]) + 1
+    return Candidate(gyro, "scale", int(moving[first]), end, best[0], size, "1")
+
+
+def _ends(sx: np.ndarray, sw: np.ndarray, first: int, last: int) -> tuple[int, int]:
+    """Maximum-likelihood ends of the stretch: the greatest (Σx)²/Σw."""
+    total = len(sx) - 1
+    for _ in range(ROUNDS):
+        before, reach = (first, last), max(last - first, FEWEST_BLOCKS)
+        begins = np.arange(max(0, first - reach), last)
+        first = int(begins[np.argmax((sx[last] - sx[begins]) ** 2 / (sw[last] - sw[begins]))])
+        ends = np.arange(first + 1, min(total, last + reach) + 1)
+        last = int(ends[np.argmax((sx[ends] - sx[first]) ** 2 / (sw[ends] - sw[first]))])
+        if (first, last) == before:
+            break
+    return first, last

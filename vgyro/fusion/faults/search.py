@@ -1,0 +1,192 @@
+"""The search: take the strongest suspicion, leave that gyro out there, look again, until none is strong enough."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vgyro.config import FaultOptions
+from vgyro.fusion.array import ArrayRates
+from vgyro.fusion.events import FAULT_KINDS, FaultEvent
+from vgyro.fusion.faults.bias import suspect_bias
+from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums
+from vgyro.fusion.faults.candidate import Candidate
+from vgyro.fusion.faults.dead import find_dead
+from vgyro.fusion.faults.noise import noise_level, suspect_noise
+from vgyro.fusion.faults.residuals import Residuals, Spoilt, residuals_of, usual_variance
+from vgyro.fusion.faults.scale import slope_in, suspect_scale, usual_slope
+from vgyro.fusion.faults.wander import bends_of, healthy_array, local_variance, slow_part
+
+FEWEST_GYROS = 3
+FEWEST_BLOCKS = 20
+LONGEST_GAP_S = 60.0
+MOST_ROUNDS = 100
+NEAR = 8  # blocks: candidates nearer to each other than this are not taken in one round
+ONLY_DEAD = "only stuck and dropout were looked for"
+TOO_FEW = f"fewer than three gyros: a difference does not tell which of two is at fault; {ONLY_DEAD}"
+TOO_SHORT = f"less than {FEWEST_BLOCKS} blocks; {ONLY_DEAD}"
+BIAS_KINDS = ("step", "drift")
+NOISE_KINDS = ("noise", "burst")
+
+
+def limits_of(array: ArrayRates, options: FaultOptions | None = None) -> str:
+    """What could not be looked for in this recording, and why; "" where all kinds could."""
+    if array.rate.shape[1] < FEWEST_GYROS:
+        return TOO_FEW
+    length = block_length(array.rate_hz, (options or FaultOptions()).block_s)
+    return TOO_SHORT if len(array.rate) < FEWEST_BLOCKS * length else ""
+
+
+def find_faults(
+    array: ArrayRates, options: FaultOptions | None = None, zero: np.ndarray | None = None
+) -> list[FaultEvent]:
+    """Stretches in which a gyro is at fault, in the order of their starts.
+
+    zero : [N, 2] deg/s, between which the rate of a count of zero lies (NaN: not known), to tell dropout from stuck
+    Parity: each gyro against the inverse-variance combination of the others, so that the motion cancels. The strongest
+    suspicion is taken (for a single fault that is the likelihood's choice), its gyro left out of the combination there,
+    and the search begun again, so that it accuses no other. Evidence is in standard deviations of what this recording
+    does in health, estimated robustly; events weaker than options.threshold are none.
+    Ours (row E).
+    """
+    options = options or FaultOptions()
+    dead = find_dead(array, zero)
+    if limits_of(array, options):
+        return dead
+    gone = [[(one.start, one.stop) for one in dead if one.gyro == gyro] for gyro in range(array.rate.shape[1])]
+    length = block_length(array.rate_hz, options.block_s)
+    stretches = [np.array(spans, dtype=np.int64).reshape(-1, 2) for spans in gone]
+    sums = block_sums(array, length, stretches, LONGEST_GAP_S)
+    state = _State(sums, length * array.period, options, _spoilt_by(dead, sums))
+    found = [_in_samples(one, sums) for one in _merged(state.search(), options.burst_s / state.block_s)]
+    return sorted([*dead, *found], key=lambda event: (event.start, event.gyro, event.kind))
+
+
+def _spoilt_by(dead: Sequence[FaultEvent], sums: BlockSums) -> list[Spoilt]:
+    found = []
+    for one in dead:
+        first = int(np.searchsorted(sums.edges, one.start, side="right")) - 1
+        found.append(Spoilt(one.gyro, first, int(np.searchsorted(sums.edges, one.stop, side="left"))))
+    return found
+
+
+@dataclass
+class _State:
+    """What is known so far of the faults of one recording."""
+
+    sums: BlockSums
+    block_s: float
+    options: FaultOptions
+    dead: list[Spoilt]
+    taken: list[Candidate] = field(default_factory=list)
+
+    def search(self) -> list[Candidate]:
+        sigma2 = usual_variance(self.sums)
+        gain = self._gain(sigma2)
+        for _ in range(MOST_ROUNDS):
+            found = residuals_of(self.sums, sigma2, gain, self._spoilt())
+            accepted = list(_apart(self._suspects(found)))
+            if not accepted:
+                break
+            self.taken += accepted
+            if any(one.kind == "scale" for one in accepted):
+                gain = self._gain(sigma2)
+        return self.taken
+
+    def _gain(self, sigma2: np.ndarray) -> np.ndarray:
+        """Sensitivity of each gyro relative to the others [B, N]: constant but for changes that were found.
+
+        What is known of the sizes of these changes is brought up to date. 1 without motion.
+        """
+        gyros, spoilt = self.sums.gyros, self._spoilt()
+        gain = np.ones((len(self.sums), gyros))
+        found = residuals_of(self.sums, sigma2, gain, spoilt)
+        usual = [1.0 + usual_slope(self.sums, found, gyro, self._counts(gyro, ("scale",))) for gyro in range(gyros)]
+        gain *= np.array(usual) / np.median(usual)
+        if all(one.kind != "scale" for one in self.taken):
+            return gain
+        found = residuals_of(self.sums, sigma2, gain, spoilt)
+        for index, one in enumerate(self.taken):
+            if one.kind == "scale":
+                size = slope_in(self.sums, found, one.gyro, one.first, one.last)
+                self.taken[index] = replace(one, size=size)
+        for one in self.taken:
+            if one.kind == "scale":
+                gain[one.first : one.last, one.gyro] *= 1.0 + one.size
+        return gain
+
+    def _spoilt(self) -> list[Spoilt]:
+        return [*self.dead, *(Spoilt(one.gyro, one.first, one.last) for one in self.taken)]
+
+    def _counts(self, gyro: int, kinds: Sequence[str], edges: Sequence[str] = ()) -> np.ndarray:
+        """Blocks [B] without a fault of these kinds of that gyro, and without an end of one of the kinds `edges`."""
+        counts = np.ones(len(self.sums), dtype=bool)
+        for dead in self.dead:
+            if dead.gyro == gyro:
+                counts[dead.first : dead.last] = False
+        for one in self.taken:
+            if one.gyro == gyro and one.kind in kinds:
+                counts[one.first : one.last] = False
+            if one.gyro == gyro and one.kind in edges:
+                for place in (one.first, one.last):
+                    counts[max(0, place - 2) : place + 2] = False
+        return counts
+
+    def _suspects(self, found: Residuals) -> list[Candidate]:
+        """The strongest suspicion of every gyro and kind."""
+        threshold, run = self.options.threshold, self.sums.run
+        suspects: list[Candidate | None] = []
+        counts = [self._counts(gyro, BIAS_KINDS) for gyro in range(self.sums.gyros)]
+        healthy = [self._counts(gyro, FAULT_KINDS) for gyro in range(self.sums.gyros)]
+        slow = [slow_part(found, gyro, counts[gyro], run) for gyro in range(self.sums.gyros)]
+        bends = [bends_of(part, one) for part, one in zip(slow, healthy, strict=True)]
+        for gyro, part in enumerate(healthy_array(slow, bends)):
+            suspects.append(suspect_bias(part, gyro, self.block_s, threshold))
+            level = noise_level(found, gyro, self._counts(gyro, NOISE_KINDS, (*BIAS_KINDS, "scale")))
+            suspects.append(suspect_noise(level, gyro, self.block_s, self.options.burst_s, threshold))
+            steady = self._counts(gyro, ("scale",), BIAS_KINDS)
+            suspects.append(suspect_scale(self.sums, found, gyro, steady, local_variance(found, gyro), threshold))
+        return [one for one in suspects if one is not None]
+
+
+def _apart(suspects: Sequence[Candidate]) -> Iterator[Candidate]:
+    """The strongest, and what is apart from all that is stronger: that would not look different without it.
+
+    A change of scale comes alone: it changes what is usual all over the recording.
+    """
+    stronger: list[Candidate] = []
+    for one in sorted(suspects, key=lambda one: -one.evidence):
+        if stronger and "scale" in (one.kind, stronger[0].kind):
+            continue
+        if all(one.last + NEAR <= other.first or other.last + NEAR <= one.first for other in stronger):
+            yield one
+        stronger.append(one)
+
+
+def _merged(found: Sequence[Candidate], burst_blocks: float) -> list[Candidate]:
+    """Events of a gyro and kind that touch as one; step and drift, noise and burst are of one kind here."""
+    merged: list[Candidate] = []
+    for kinds in (BIAS_KINDS, NOISE_KINDS, ("scale",)):
+        for one in sorted((one for one in found if one.kind in kinds), key=lambda one: (one.gyro, one.first)):
+            last = merged[-1] if merged else None
+            joins = last is not None and last.gyro == one.gyro and last.kind in kinds and one.first <= last.last + NEAR
+            if last is None or not joins:
+                merged.append(one)
+                continue
+            longer = max(last, one, key=lambda part: part.last - part.first)
+            size = max(last.size, one.size, key=abs) if kinds is BIAS_KINDS else longer.size
+            evidence = max(last.evidence, one.evidence)
+            both = replace(longer, first=last.first, last=max(last.last, one.last), evidence=evidence, size=size)
+            merged[-1] = both if kinds is not NOISE_KINDS else replace(both, kind=_noise_kind(both, burst_blocks))
+    return merged
+
+
+def _noise_kind(one: Candidate, burst_blocks: float) -> str:
+    return "burst" if one.last - one.first < burst_blocks else "noise"
+
+
+def _in_samples(one: Candidate, sums: BlockSums) -> FaultEvent:
+    start, stop = int(sums.edges[one.first]), int(sums.edges[one.last])
+    return FaultEvent(one.gyro, one.kind, start, stop, one.evidence, one.size, one.unit)
