@@ -10,6 +10,7 @@ import pytest
 
 from vgyro.fusion import ArrayNoise, FilterParameters
 from vgyro.fusion.more_gyros import MeanCorrelation, analyse
+from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, TableWriter, write_json, write_table
 from vgyro.tasks.common import Task
 
@@ -26,6 +27,7 @@ METHODS = (
     ("dcc_in_sample", "level", "DCC weights, in-sample", False),
     ("dcc_causal", "level", "DCC weights, causal", True),
     ("dcc_causal", "residual", "DCC weights, causal", True),
+    ("recommended", "", "Recommended", False),
 )
 MOVED = "dcc_causal[level]"
 ADDED_RATE = 0.05
@@ -226,17 +228,25 @@ def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...]
     level |= {column: 0.05 / GAIN.get(column.split("[")[0], 2.0) for column in columns}
     _write_curves(folder, level)
     _write_metrics(folder, recording, axis, gyros, fused, level)
-    words = ("method", "definition", "column", "title", "source", "causal", "note", "response", "moved")
+    words = (
+        "method", "definition", "column", "title", "source", "family", "needs", "inferred", "causal", "note",
+        "response", "moved",
+    )  # fmt: skip
     methods: dict[str, Any] = {name: [] for name in words}
     for (name, definition, title, causal), column in zip(fused, columns, strict=True):
         lost = name == "inverse_variance_rrw"
         note = "no RRW was found for g1" if lost else ""
         moved = "" if lost else column if column == MOVED else "the same at any constant rate: weights add up to one"
-        row = (name, definition, "" if lost else column, title, "paper <eq. 1>", causal, note, "analytic", moved)
+        family = {"recommended": "ours", "average": "baseline", "median": "baseline"}.get(name, "paper")
+        inferred = "one of <two> equations" if "jiang" in name else ""
+        row = (
+            name, definition, "" if lost else column, title, "paper <eq. 1>", family, "arw, rrw" if lost else "weights",
+            inferred, causal, note, "analytic", moved,
+        )  # fmt: skip
         for key, value in zip(words, row, strict=True):
             methods[key].append(value)
     filtered = np.array([name == "jiang_random_walk" for name, *_ in fused], dtype=bool)
-    figures = {"dc_gain": 1.0, "bandwidth_hz": 1.05, "noise_bandwidth_hz": 1.65, "delay_s": 0.15}
+    figures = {"dc_gain": 1.0, "bandwidth_hz": 1.05, "noise_bandwidth_hz": 1.65, "delay_s": 0.15, "operations": 1234.0}
     for key, value in figures.items():
         plain = 1.0 if key == "dc_gain" else 0.0 if key == "delay_s" else np.nan
         methods[key] = np.where(filtered, value, plain)
@@ -266,6 +276,7 @@ def _write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...]
     if recording == "rest":
         _write_more_gyros(folder, gyros, value.reshape(len(gyros), -1))
         _write_effects(folder, gyros)
+        _write_bekk(folder)
         for definition in ("level", "residual"):
             _write_volatility(folder / definition, gyros)
 
@@ -275,6 +286,36 @@ def _write_more_gyros(folder: Path, gyros: tuple[str, ...], correlation: np.ndar
     mean = MeanCorrelation.of(correlation, correlation - 0.02, correlation + 0.02)
     found = analyse(ArrayNoise(arw, arw, np.eye(len(arw))), mean, FilterParameters(), 20)
     write_table(folder / "more_gyros.parquet", found.columns, "more_gyros", PROVENANCE, {"summary": found.summary})
+
+
+def _write_bekk(folder: Path) -> None:
+    """Two definitions, three windows each: DCC's log-likelihood is 1000, its 1σ 0.05 deg/s."""
+    parameters = {"ccc": 18, "dcc": 20, "bekk_scalar": 12, "bekk_diagonal": 18}
+    gain = {
+        "ccc": (-3.0, -3.0, -20.0),
+        "dcc": (0.0, 0.0, 0.0),
+        "bekk_scalar": (-30.0,) * 3,
+        "bekk_diagonal": (-9.0,) * 3,
+    }
+    share = {
+        "ccc": (1.1, 0.9, 1.1),
+        "dcc": (1.0, 1.0, 1.0),
+        "bekk_scalar": (1.2,) * 3,
+        "bekk_diagonal": (0.9, 0.8, 1.01),
+    }
+    rows = [
+        {
+            "window": window, "start": 30 * window, "stop": 30 * window + 360, "time_start": 30.0 * window,
+            "time_stop": 30.0 * window + 359, "definition": definition, "model": model, "parameters": number,
+            "log_likelihood": 1000 + gain[model][window], "sigma": 0.05 * share[model][window], "status": "converged",
+            "bic": number * np.log(360) - 2 * (1000 + gain[model][window]),
+        }
+        for definition in ("level", "residual")
+        for window in range(3)
+        for model, number in parameters.items()
+    ]  # fmt: skip
+    names = [column.name for column in SCHEMAS["bekk"].columns]
+    write_table(folder / "bekk.parquet", {name: [row[name] for row in rows] for name in names}, "bekk", PROVENANCE)
 
 
 def _write_curves(folder: Path, level: dict[str, float]) -> None:

@@ -37,6 +37,16 @@ def with_metric(dataset: DatasetPart, method: str, metric: str, value: float) ->
     return with_array(dataset, array, {"metrics": table})
 
 
+def with_error(dataset: DatasetPart, method: str, value: float) -> DatasetPart:
+    """The data set with one method's error 1σ in motion changed."""
+    array = next(one for one in dataset.arrays if one.anchor == "sine-x")
+    table = {name: column.copy() for name, column in array.tables["metrics"].items()}
+    mask = (table["method"] == method) & (table["metric"] == "error_sigma")
+    for name in ("value", "low", "high"):
+        table[name][mask] = value
+    return with_array(dataset, array, {"metrics": table})
+
+
 def with_g4_at(dataset: DatasetPart, sigma: float, arw: float, allan: float) -> DatasetPart:
     """The data set with the noisy gyro at these multiples of the median of the other three."""
     values = array_of(dataset).values()
@@ -113,6 +123,32 @@ def test_the_best_method_is_that_at_equal_bandwidth(dataset: DatasetPart) -> Non
     # Raw 1σ favours the low-pass (3.4 against 2.9); at equal bandwidth it has 0.7 of that, less than DCC.
     assert best_method(array, "if_sigma").method == "jiang_random_walk"
     assert best_method(array, "if_sigma_equal").method == "dcc_causal", "not dcc_in_sample"
+
+
+def test_the_best_causal_method_stands_beside_an_offline_one(dataset: DatasetPart) -> None:
+    assert not any("Best causal" in one.text for one in conclude(dataset))
+    better = with_metric(dataset, "recommended", "if_sigma_equal", 9.0)
+    said = [one.text for one in conclude(better)]
+    (best,) = [text for text in said if text.startswith("Best method at rest (axis x")]
+    assert "Recommended (offline), improvement factor 9" in best
+    (causal,) = [text for text in said if text.startswith("Best causal method at rest (axis x")]
+    assert "Recommended" not in causal
+    motion = next(text for text in said if text.startswith("In motion (axis x"))
+    assert "(offline)" not in motion
+    faster = with_error(dataset, "recommended", 0.001)
+    (motion,) = [one.text for one in conclude(faster) if one.text.startswith("In motion (axis x")]
+    assert "0.00100" in motion
+    assert "by Recommended (offline), of the causal methods 0.01" in motion
+
+
+def test_what_a_smoother_of_another_shape_reads_is_never_the_best(dataset: DatasetPart) -> None:
+    array = array_of(with_metric(dataset, "average", "if_sigma_equal", 9.0))
+    assert best_method(array, "if_sigma_equal").method == "average"
+    table = {name: column.copy() for name, column in array.tables["metrics"].items()}
+    row = (table["method"] == "average") & (table["metric"] == "if_sigma_equal")
+    table["note"] = np.where(row, "the low-pass takes part in it", table["note"]).astype(object)
+    limited = replace(array, tables={**array.tables, "metrics": table})
+    assert best_method(limited, "if_sigma_equal").method != "average"
 
 
 def test_the_headline_is_a_method_that_holds_at_the_added_rate(dataset: DatasetPart) -> None:

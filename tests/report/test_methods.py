@@ -95,7 +95,7 @@ def test_figures_at_the_added_rate_stand_beside_those_at_rest_and_nowhere_else(d
     row = re.search(r">DCC weights, causal<.*?</tr>", html, re.S).group(0)
     # Mean and bias drift fail by the rule; 1σ is 1.1 times that at rest, N about 1.07 times.
     assert row.count('class="number bad"') == 2
-    assert "DCC weights, causal (residual): the same at any constant rate" in html
+    assert "DCC weights, causal (residual); Recommended: the same at any constant rate" in html
     assert "\u22120.024" not in rest_tables(dataset, array)
 
 
@@ -119,3 +119,48 @@ def test_one_gyro_has_a_table_without_methods(dataset: DatasetPart) -> None:
     assert "solo" in html
     assert "Methods" not in html
     assert "Improvement factor" not in html
+
+
+def headings(html: str) -> list[str]:
+    return [re.sub("<[^>]*>", "", row).strip() for row in re.findall(r"<tr[^>]*heading.*?</tr>", html, re.S)]
+
+
+def test_methods_stand_under_their_families(dataset: DatasetPart) -> None:
+    html = response_table(dataset, array_of(dataset, "rest-x"))
+    families = ["Baselines", "Methods of the papers", "Ours"]
+    assert [text for text in headings(html) if text in families] == families
+    names = re.findall(r'scope="row"[^>]*>([^<]*)', html)
+    methods = [name.strip() for name in names if name.strip() not in (*array_of(dataset, "rest-x").gyros, *families)]
+    assert methods[:2] == ["Average", "Median"]
+    assert methods[-1] == "Recommended"
+
+
+def test_what_a_method_costs_and_needs_and_what_was_inferred(dataset: DatasetPart) -> None:
+    html = response_table(dataset, array_of(dataset, "rest-x"))
+    row = re.search(r">Jiang 2012, random walk<.*?</tr>", html, re.S).group(0)
+    # Two digits of 1234; all of them in the hint.
+    assert ">1200<" in row
+    assert "counted from the equations: 1234" in row
+    assert ">causal<" in row
+    assert ">volatility weights<" in row
+    assert "inferred: one of &lt;two&gt; equations" in html
+    offline = re.search(r">Recommended<.*?</tr>", html, re.S).group(0)
+    assert ">offline<" in offline
+
+
+def test_nees_stands_beside_the_errors(dataset: DatasetPart) -> None:
+    array = array_of(dataset, "sine-x")
+    assert "NEES" not in dynamic_table(dataset, array)
+    table = {name: column.copy() for name, column in array.tables["metrics"].items()}
+    (row,) = np.flatnonzero((table["method"] == "recommended") & (table["metric"] == "error_sigma"))
+    note = "95.1 % of the samples within ±2 s.d.; bootstrap of blocks of 3 s"
+    values = {"metric": "nees", "value": 1.02, "low": 0.97, "high": 1.07, "unit": "1", "note": note}
+    longer = {
+        name: np.append(column, [values.get(name, column[row])]).astype(column.dtype) for name, column in table.items()
+    }
+    html = dynamic_table(dataset, replace(array, tables={**array.tables, "metrics": longer}))
+    recommended = re.search(r">Recommended<.*?</tr>", html, re.S).group(0)
+    assert "1.020" in recommended
+    assert "95.1 % of the samples" in recommended
+    assert "gives no standard deviation" in re.search(r">Average<.*?</tr>", html, re.S).group(0)
+    assert "NEES: mean of (error" in html

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.figure import Figure
+from vgyro.report.figure_cells import says_limited
 from vgyro.report.model import ArrayPart, DatasetPart, Value
 from vgyro.report.moved import failing
 from vgyro.report.noise import method_labels
@@ -19,10 +20,14 @@ FAIR, RAW = "if_sigma_equal", "if_sigma"
 FACTORS = ((FAIR, "1σ at equal bandwidth"), ("if_arw", "N"), ("if_bias_drift", "bias drift"))
 RAW_FACTOR = (RAW, "1σ")
 IN_SAMPLE = "_in_sample"
+OFFLINE = " (offline)"
 BEST_RULES = (
     "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording at "
     "rest, by 1σ at equal bandwidth (every series low-passed to one bandwidth), by the fitted N and by bias drift. "
-    "In-sample weights are left out, because they have seen what they weigh.",
+    "In-sample weights are left out, because they have seen what they weigh. Where the best is an offline method, the "
+    "best causal one is named, too. A smoother whose shape is not that of a low-pass run once, or forward and back, is "
+    "not compared by 1σ or N.",
+    "In motion: the least 1σ of the error against the reference, in-sample weights left out again.",
     "DCC beats the simple baselines (average, median, fixed inverse variance) where the lower limit of its factor is "
     "above the best of theirs.",
 )
@@ -51,6 +56,7 @@ def best_method(array: ArrayPart, figure: str, allowed: Callable[[Name], bool] =
         Best(label, name, figure, array.values()[name][figure], array.axis, array.recording)
         for name, label in _labels(array).items()
         if not name[0].endswith(IN_SAMPLE) and allowed(name) and figure in _known(array, name)
+        if not says_limited(array.values()[name][figure])
     ]
     return max(found, key=lambda best: best.factor.value, default=None)
 
@@ -88,26 +94,41 @@ def factors_of(array: ArrayPart) -> tuple[tuple[str, str], ...]:
 def rest_sentences(dataset: DatasetPart, array: ArrayPart) -> list[Conclusion]:
     """The best methods at rest, whether DCC beats the baselines, and what fails at the added rate."""
     place = f"axis {array.axis}, {array.recording}"
-    failed = failing(array)
-    parts: dict[str, list[str]] = {}
-    for figure, words in factors_of(array):
-        best = best_method(array, figure)
-        if best is None:
-            continue
-        said = f"{factor(best.factor)} by {words}"
-        if best.name in failed:
-            holds = best_method(array, figure, lambda name: name not in failed)
-            other = f"; of those that hold {holds.label}, {factor(holds.factor)}" if holds else ""
-            said += f" (fails at {plain(array.added_rate)} deg/s{other})"
-        parts.setdefault(f"{best.label}{'' if _causal(array, best.name) else ' (not causal)'}", []).append(said)
-    if not parts:
+    listed = _listed(array)
+    if not listed:
         return []
-    listed = "; ".join(f"{label}, improvement factor {', '.join(said)}" for label, said in parts.items())
     found = [Conclusion(f"Best method at rest ({place}): {listed}.", "", array.anchor)]
+    if OFFLINE in listed:
+        causal = _listed(array, causal=True)
+        found += [Conclusion(f"Best causal method at rest ({place}): {causal}.", "", array.anchor)] if causal else []
     compared = [text for figure, words in factors_of(array) if (text := _dcc_words(array, figure, words))]
     if compared:
         found.append(Conclusion(f"Causal DCC ({place}) {'; '.join(compared)}.", "", array.anchor))
     return found + _failing_sentence(dataset, array, place)
+
+
+def _listed(array: ArrayPart, *, causal: bool = False) -> str:
+    """The best method by each factor, with that factor; "" where none is known.  causal : of the causal ones alone"""
+    failed = failing(array)
+    parts: dict[str, list[str]] = {}
+
+    def allowed(name: Name) -> bool:
+        return not causal or _causal(array, name)
+
+    def holding(name: Name) -> bool:
+        return name not in failed and allowed(name)
+
+    for figure, words in factors_of(array):
+        best = best_method(array, figure, allowed)
+        if best is None:
+            continue
+        said = f"{factor(best.factor)} by {words}"
+        if best.name in failed:
+            holds = best_method(array, figure, holding)
+            other = f"; of those that hold {holds.label}, {factor(holds.factor)}" if holds else ""
+            said += f" (fails at {plain(array.added_rate)} deg/s{other})"
+        parts.setdefault(f"{best.label}{'' if _causal(array, best.name) else OFFLINE}", []).append(said)
+    return "; ".join(f"{label}, improvement factor {', '.join(said)}" for label, said in parts.items())
 
 
 def _failing_sentence(dataset: DatasetPart, array: ArrayPart, place: str) -> list[Conclusion]:
@@ -152,20 +173,21 @@ def _dcc_words(array: ArrayPart, figure: str, words: str) -> str:
 
 
 def motion_sentences(dataset: DatasetPart) -> list[Conclusion]:
-    """The method with the least error in each recording that has a reference."""
+    """The method with the least error in each recording that has a reference, and the causal one with the least."""
     found = []
     for array in dataset.arrays:
-        labels = _labels(array)
+        labels = {name: label for name, label in _labels(array).items() if not name[0].endswith(IN_SAMPLE)}
         errors = {name: _known(array, name)["error_sigma"] for name in labels if "error_sigma" in _known(array, name)}
-        if errors:
-            best = min(errors, key=lambda name: errors[name].value)
-            text = (
-                f"In motion (axis {array.axis}, {array.recording}) the least error 1σ is {interval(errors[best])} deg/s"
-            )
-            against = (
-                f", against {significant(errors['average', ''].value)} of the average"
-                if ("average", "") in errors
-                else ""
-            )
-            found.append(Conclusion(f"{text}, by {labels[best]}{against}.", "", array.anchor))
+        if not errors:
+            continue
+        best = min(errors, key=lambda name: errors[name].value)
+        text = f"In motion (axis {array.axis}, {array.recording}) the least error 1σ is {interval(errors[best])} deg/s"
+        text += f", by {labels[best]}"
+        causal = [name for name in errors if _causal(array, name)]
+        if causal and not _causal(array, best):
+            first = min(causal, key=lambda name: errors[name].value)
+            text += f"{OFFLINE}, of the causal methods {significant(errors[first].value)}, by {labels[first]}"
+        if ("average", "") in errors:
+            text += f", against {significant(errors['average', ''].value)} of the average"
+        found.append(Conclusion(f"{text}.", "", array.anchor))
     return found

@@ -22,10 +22,12 @@ ROUTINE = (
     "one-sided ",
     "of the error",
     "low-passed to",
+    "forward and back",
     BAND_LIMITED,
     TAKES_PART,
 )
-ROUTINE_END = "degrees of freedom"
+ROUTINE_END = ("degrees of freedom", " s.d.")
+NOT_GIVEN = {"nees": "the method gives no standard deviation of its rate"}
 
 
 def figure_column(figure: Figure, group: str = "") -> Column:
@@ -47,7 +49,9 @@ def figure_cell(
     limited : a low-pass lowers it by itself, whether its note says so or not
     """
     if value is None:
-        hint = "compares a method with the single gyros" if gyro and metric.startswith("if_") else "not computed"
+        hint = NOT_GIVEN.get(metric, "not computed")
+        if gyro and metric.startswith("if_"):
+            hint = "compares a method with the single gyros"
         return Cell("" if gyro and metric.startswith("if_") else MISSING, tone="muted", hint=hint)
     if not value.known:
         return Cell(MISSING, tone="muted", hint=value.note, notes=notes.number(value.note))

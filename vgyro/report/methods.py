@@ -59,6 +59,7 @@ DYNAMIC = (
     "error_sigma",
     "error_sigma_aligned",
     "error_sigma_scaled",
+    "nees",
     "amplitude",
     "phase",
     "delay",
@@ -76,15 +77,19 @@ LOWER_IS_BETTER = (
     "error_sigma_scaled",
     "angle_drift_60s",
 )
-RESPONSE = "response of the method"
+METHOD, RESPONSE = "the method", "response of the method"
 PROPERTIES = (
-    Column("causal", numeric=False, hint="sample t uses nothing later than t; no: offline only", group=RESPONSE),
+    Column("runs", numeric=False, hint="causal: sample t uses nothing later than t; offline: it does", group=METHOD),
+    Column("needs", numeric=False, hint="what it takes beside the rates", group=METHOD),
+    Column("cost", "op/sample", hint="operations a sample, all passes, counted from the equations", group=METHOD),
+    Column("delay", "s", hint="at low frequency", group=RESPONSE),
     Column("DC gain", "1", hint="gain for a constant rate", group=RESPONSE),
     Column("−3 dB bandwidth", "Hz", group=RESPONSE),
     Column("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group=RESPONSE),
-    Column("delay", "s", hint="at low frequency", group=RESPONSE),
     Column("known", numeric=False, hint="how the four are known", group=RESPONSE),
 )
+FAMILIES = {"baseline": "Baselines", "paper": "Methods of the papers", "ours": "Ours"}
+NEEDS = {"arw": "ARW", "rrw": "RRW", "weights": "volatility weights"}
 MOST_WIDE = 7
 LIMITS = "Below each figure: its limits."
 FACTOR_WORDS = (
@@ -97,8 +102,14 @@ BAND_WORDS = (
     f"Marked “{BAND_LIMITED}”: the method's low-pass changes this reading by itself, it is no measure of its noise and "
     "never the best. N is fitted with the filter's shape and may be compared."
 )
+NEES_WORDS = (
+    "NEES: mean of (error / posterior standard deviation)², 1 where the method knows its own error; the tooltip tells "
+    "the share of the samples within ±2 standard deviations."
+)
 RESPONSE_WORDS = (
-    "Bandwidth and delay are the method's own, without the gyro's; “not limited”: it passes what the gyro passes."
+    "Cost: additions, multiplications, divisions and roots of one sample of the recording, all passes together; what "
+    "is done once a recording is left out. Bandwidth and delay are the method's own, without the gyro's; “not limited” "
+    "passes what the gyro passes."
 )
 
 MakeCells = Callable[[Mapping[str, Any]], list[Cell]]
@@ -138,9 +149,9 @@ def dynamic_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
         present = [(name, group) for name, group in present if not name.startswith("angle_")]
     caption = f"Errors against the reference rate, axis {array.axis}, recording {array.recording}"
     table = _figures(dataset, array, values, present, caption)
-    return join(
-        table, "" if _known(values, "sigma") else paragraph(FACTOR_WORDS if array.methods() else LIMITS, "note")
-    )
+    words = [] if _known(values, "sigma") else [FACTOR_WORDS if array.methods() else LIMITS]
+    words += [NEES_WORDS] if _known(values, "nees") else []
+    return join(table, *(paragraph(text, "note") for text in words))
 
 
 def _known(values: Values, metric: str) -> bool:
@@ -187,7 +198,7 @@ def _rows(
     width: int,
     notes: Notes | None = None,
 ) -> list[Row]:
-    """Gyros and methods under their headings; a method that did not run has one cell that says why.
+    """Gyros and methods under their headings, by family; a method that did not run has one cell that says why.
 
     notes : takes the remarks on the methods, which one table of a recording gives
     """
@@ -195,16 +206,23 @@ def _rows(
     rows: list[Row] = []
     if of_gyro is not None:
         rows += [Row(heading="Single gyros"), *(Row((Cell(gyro), *of_gyro(gyro))) for gyro in array.gyros)]
-        rows += [Row(heading="Methods")] if methods else []
-    for method in methods:
-        if method["column"]:
-            remark = notes.number(method["note"]) if notes else ()
-            first = Cell(method["title"], method["definition"], notes=remark, hint=method["source"])
-            rows.append(Row((first, *of_method(method))))
-        else:
-            first = Cell(method["title"], method["definition"], hint=method["source"])
-            rows.append(Row((first, Cell(f"not run: {method['note']}", tone="muted", span=width))))
+    for family, heading in FAMILIES.items():
+        mine = [method for method in methods if method["family"] == family]
+        rows += [Row(heading=heading)] if mine else []
+        rows += [_method_row(method, of_method, width, notes) for method in mine]
     return rows
+
+
+def _method_row(method: Mapping[str, Any], of_method: MakeCells, width: int, notes: Notes | None) -> Row:
+    remarks: tuple[int, ...] = ()
+    if notes is not None and method["inferred"]:
+        remarks += notes.number(f"inferred: {method['inferred']}")
+    if notes is not None and method["column"]:
+        remarks += notes.number(method["note"])
+    first = Cell(method["title"], method["definition"], notes=remarks, hint=method["source"])
+    if method["column"]:
+        return Row((first, *of_method(method)))
+    return Row((first, Cell(f"not run: {method['note']}", tone="muted", span=width)))
 
 
 def response_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
@@ -244,12 +262,20 @@ def _count(value: Value | None) -> Cell:
 def _answers(method: Mapping[str, Any]) -> list[Cell]:
     limited = [_property(float(method[name])) for name in ("bandwidth_hz", "noise_bandwidth_hz")]
     return [
-        Cell("yes" if method["causal"] else "no"),
+        Cell("causal" if method["causal"] else "offline"),
+        Cell(", ".join(NEEDS.get(word, word) for word in str(method["needs"]).split(", ")) or MISSING),
+        _cost(float(method["operations"])),
+        Cell(significant(float(method["delay_s"]))),
         Cell(significant(float(method["dc_gain"]))),
         *limited,
-        Cell(significant(float(method["delay_s"]))),
         Cell(str(method.get("response") or MISSING)),
     ]
+
+
+def _cost(operations: float) -> Cell:
+    if math.isnan(operations):
+        return Cell(MISSING, tone="muted", hint="not counted")
+    return Cell(significant(float(f"{operations:.1e}"), 2), hint=f"counted from the equations: {operations:.0f}")
 
 
 def _property(value: float) -> Cell:

@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from vgyro.report.arch import effects_table
+from vgyro.report.bekk import bekk_part
 from vgyro.report.fits import fits_map, shares
 from vgyro.report.html import details, heading, join, paragraph
 from vgyro.report.model import ArrayPart, DccSummary, GarchSummary, Record, Table, VolatilityPart, WeightCurves, rows_of
@@ -42,7 +43,7 @@ def volatility_part(array: ArrayPart) -> Markup:
     if not array.volatility:
         return paragraph("The recording is too short at rest for a rolling window: no volatility analysis.", "note")
     parts = [_definition_part(array, name, part) for name, part in array.volatility.items()]
-    return join(heading("Volatility", 4), effects_table(array), _arch_lm(array), *parts)
+    return join(heading("Volatility", 4), effects_table(array), _arch_lm(array), bekk_part(array), *parts)
 
 
 def _arch_lm(array: ArrayPart) -> Markup:
