@@ -9,7 +9,21 @@ from typing import Literal
 import numpy as np
 
 from vgyro.errors import ConfigError
-from vgyro.fusion import filters, fixed, moments
+from vgyro.fusion import (
+    al_majed,
+    bayard_ploen,
+    chang_2008,
+    costs,
+    filters,
+    fixed,
+    moments,
+    parity_rows,
+    recommended,
+    slow_rows,
+    smoothed,
+    stubberud,
+    waegli_guerrier,
+)
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused, Method
 from vgyro.fusion.conditional import SAME_AT_ANY_RATE, conditional
 from vgyro.validation import did_you_mean
@@ -18,6 +32,9 @@ LIU = "Liu et al. (2015), eq. 15-17"
 JIANG = "Jiang et al. (2012), eq. 11-14"
 XUE = "Xue et al. (2012), Measurement 45, 745-754"
 CHANG = "Chang et al. (2012), IEEE Trans. Instrum. Meas. 61, 3084-3093"
+STUBBERUD = "Stubberud & Stubberud (2008), 19th Int. Conf. Systems Engineering, 13-18"
+AL_MAJED = "Al-Majed & Alsuwaidan (2009), IEEE/ASME Conf. Advanced Intelligent Mechatronics, 1318-1323"
+OWN = "vgyro, docs/fusion.md"
 
 
 def _conditional(model: str, mode: str, source: str) -> Method:
@@ -26,37 +43,83 @@ def _conditional(model: str, mode: str, source: str) -> Method:
     causal = mode == "causal"
     return Method(
         f"{model}_{mode}", title, source, causal, ("weights",), conditional(model, mode),
-        per_definition=True, same_at_any_rate=SAME_AT_ANY_RATE,
+        per_definition=True, same_at_any_rate=SAME_AT_ANY_RATE, operations=costs.weighted,
     )  # fmt: skip
 
 
 _FIXED = {"": "Σw = 1, fixed weights"}
 _UNIT_GAIN = {"": "Σw = 1, fixed weights, DC gain 1"}
+_BANK = {"": "all members start at the mean; p depends on innovations only; Σp = 1"}
 _MEDIAN = {"": "the median moves with the gyros"}
+_PARITY = {"": "Σw = 1, and only differences between the gyros are looked at"}
+_SMOOTHED = {"": "Σw = 1, only differences between the gyros are looked at, and the smoother's DC gain is 1"}
 
 # fmt: off
-_ALL = (
-    Method("average", "Average", "baseline", True, (), fixed.average, same_at_any_rate=_FIXED),
-    Method("median", "Median", "baseline", True, (), fixed.median, same_at_any_rate=_MEDIAN),
+_BASELINES = (
+    Method("average", "Average", "baseline", True, (), fixed.average, same_at_any_rate=_FIXED,
+           family="baseline", operations=costs.weighted),
+    Method("median", "Median", "baseline", True, (), fixed.median, same_at_any_rate=_MEDIAN,
+           family="baseline", operations=costs.sorted_median),
     Method("inverse_variance_arw", "Inverse variance, ARW", "w ∝ 1/N²", True, ("arw",), fixed.inverse_variance_arw,
-           same_at_any_rate=_FIXED),
+           same_at_any_rate=_FIXED, family="baseline", operations=costs.weighted),
     Method("inverse_variance_rrw", "Inverse variance, RRW", "w ∝ 1/K²", True, ("rrw",), fixed.inverse_variance_rrw,
-           same_at_any_rate=_FIXED),
-    Method("rolling_moment", "Rolling second moment", "w ∝ 1/m²", True, (), moments.rolling_moment),
-    Method("ewma_causal", "EWMA second moment, causal", "w ∝ 1/m²", True, (), moments.ewma_causal),
-    Method("ewma_two_sided", "EWMA second moment, two-sided", "w ∝ 1/m²", False, (), moments.ewma_two_sided),
-    Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), filters.jiang_markov),
+           same_at_any_rate=_FIXED, family="baseline", operations=costs.weighted),
+    Method("rolling_moment", "Rolling second moment", "w ∝ 1/m²", True, (), moments.rolling_moment,
+           family="baseline", operations=costs.moments),
+    Method("ewma_causal", "EWMA second moment, causal", "w ∝ 1/m²", True, (), moments.ewma_causal,
+           family="baseline", operations=costs.moments),
+    Method("ewma_two_sided", "EWMA second moment, two-sided", "w ∝ 1/m²", False, (), moments.ewma_two_sided,
+           family="baseline", operations=costs.moments),
+    Method("average_smoothed", "Average, smoothed", OWN, False, (), smoothed.average_smoothed,
+           same_at_any_rate=_SMOOTHED, family="baseline", operations=costs.smoothed_average),
+    Method("median_smoothed", "Median, smoothed", OWN, False, (), smoothed.median_smoothed,
+           same_at_any_rate=_SMOOTHED, family="baseline", operations=costs.smoothed_median),
+)
+_PAPERS = (
+    Method("bayard_ploen", "Bayard & Ploen 2003, parity form", bayard_ploen.SOURCE, True, ("arw", "rrw", "correlation"),
+           bayard_ploen.bayard_ploen, same_at_any_rate=bayard_ploen.SAME_AT_ANY_RATE,
+           operations=bayard_ploen.operations, inferred=bayard_ploen.INFERRED),
+    Method("chang_2008", "Chang 2008, level 1", chang_2008.SOURCE, True, ("arw", "rrw", "correlation"),
+           chang_2008.chang_2008, operations=chang_2008.operations, inferred=chang_2008.INFERRED),
+    Method("stubberud_2008", "Stubberud 2008, EKF of scale and bias", STUBBERUD, True, ("arw", "rrw"),
+           stubberud.stubberud_2008, operations=stubberud.operations, inferred=stubberud.INFERRED),
+    Method("al_majed", "Al-Majed 2009, adaptive bank", AL_MAJED, True, ("arw",), al_majed.al_majed,
+           same_at_any_rate=_BANK, operations=al_majed.operations, inferred=al_majed.INFERRED),
+    Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), filters.jiang_markov,
+           operations=costs.low_passed),
     Method("jiang_random_walk", "Jiang 2012, random walk", f"{JIANG}, 1/τ → 0", True, ("arw",),
-           filters.jiang_random_walk, same_at_any_rate=_UNIT_GAIN),
+           filters.jiang_random_walk, same_at_any_rate=_UNIT_GAIN, operations=costs.low_passed),
     Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), filters.xue_2012,
-           same_at_any_rate=_UNIT_GAIN),
+           same_at_any_rate=_UNIT_GAIN, operations=costs.settling, inferred="P0 = 1/(D·T)"),
     Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), filters.chang_2012,
-           same_at_any_rate=_UNIT_GAIN),
+           same_at_any_rate=_UNIT_GAIN, operations=costs.low_passed),
     _conditional("ccc", "in_sample", f"{LIU}, a = b = 0"),
     _conditional("ccc", "causal", f"{LIU}, a = b = 0, carried forward"),
     _conditional("dcc", "in_sample", LIU),
     _conditional("dcc", "causal", f"{LIU}, carried forward"),
+    Method("waegli_guerrier", "Waegli/Guerrier, ARMA-GARCH of the residual", waegli_guerrier.SOURCE, False, (),
+           waegli_guerrier.waegli_guerrier, same_at_any_rate=waegli_guerrier.SAME_AT_ANY_RATE,
+           operations=waegli_guerrier.operations, inferred=waegli_guerrier.INFERRED),
 )
+_OURS = (
+    Method("parity_weights", "Parity variances", OWN, False, (), parity_rows.parity_weights,
+           same_at_any_rate=_PARITY, family="ours", operations=costs.residuals),
+    Method("residual_weights", "Changing parity variances", OWN, False, (), parity_rows.residual_weights,
+           same_at_any_rate=_PARITY, family="ours", operations=costs.residuals),
+    Method("frequency_weights", "Weights of each frequency", OWN, False, ("arw",), slow_rows.frequency_weights,
+           same_at_any_rate=_PARITY, family="ours", operations=costs.without_slow),
+    Method("parity_smoothed", "Parity variances, smoothed", OWN, False, (), smoothed.parity_smoothed,
+           same_at_any_rate=_SMOOTHED, family="ours", operations=costs.smoothed_average),
+    Method("residual_smoothed", "Changing parity variances, smoothed", OWN, False, (), smoothed.residual_smoothed,
+           same_at_any_rate=_SMOOTHED, family="ours", operations=costs.smoothed_average),
+    Method("dcc_smoothed", "DCC of the residual, smoothed", f"{OWN}; {LIU}", False, ("weights",),
+           smoothed.dcc_smoothed, same_at_any_rate=_SMOOTHED, family="ours", operations=costs.smoothed_average),
+    Method("recommended_unsmoothed", "Recommended, not smoothed", OWN, False, (), recommended.recommended_unsmoothed,
+           same_at_any_rate=_PARITY, family="ours", operations=costs.everything),
+    Method("recommended", "Recommended", OWN, False, (), recommended.recommended,
+           same_at_any_rate=_SMOOTHED, family="ours", operations=costs.everything_smoothed),
+)
+_ALL = (*_BASELINES, *_PAPERS, *_OURS)
 # fmt: on
 
 METHODS: dict[str, Method] = {method.name: method for method in _ALL}

@@ -1,0 +1,184 @@
+"""Rows of the maximum-likelihood smoother: one fused rate, its variance a sample, and a model of the motion.
+
+In motion the model of the rate and its parameters are those of the greatest likelihood (vgyro.fusion.smoother). In a
+recording that is at rest as a whole the likelihood would make the process noise zero and the virtual gyro deaf: there
+the smoother is the first-order low-pass of `bandwidth_hz`, run forward and back.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro import engine as engines
+from vgyro.errors import DataError
+from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.blocks import SampleWeights, combined
+from vgyro.fusion.conditional import conditional
+from vgyro.fusion.fixed import median
+from vgyro.fusion.parity import Variances, parity_variances
+from vgyro.fusion.smoother import Smoothed, choose_motion, fixed_bandwidth, smooth
+
+DCC = ("dcc", "in_sample", "residual")
+REST_NOTE = "at rest as a whole: a fixed bandwidth, forward and back"
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A fused rate before it is smoothed.
+
+    rate     : [T], deg/s;  variance : of its white noise, (deg/s)² a sample, one number or [T]
+    colour   : correlation of that noise from one sample to the next
+    weights  : as in Fused;  note : what to know of them
+    """
+
+    rate: np.ndarray
+    variance: float | np.ndarray
+    colour: float
+    weights: np.ndarray | SampleWeights | None
+    note: str
+
+
+def shared_variances(array: ArrayRates, parameters: FilterParameters, changing: bool) -> Variances:
+    """vgyro.fusion.parity.parity_variances, estimated once for all methods that need them."""
+    return array.once(("variances", changing), lambda: parity_variances(array, parameters, changing))
+
+
+def average_smoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
+    """The average, smoothed. Its variance is that of the gyros' constant variances (parity)."""
+    variances, gyros = shared_variances(array, parameters, False), array.rate.shape[1]
+    equal = np.full(gyros, 1.0 / gyros)
+    variance = float(np.mean(variances.combined_variance(equal)))
+    signal = Signal(combined(array.rate, equal), variance, variances.colour(equal), equal, "")
+    return smoothed(array, parameters, signal)
+
+
+def median_smoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
+    """The median of the gyros, smoothed.
+
+    Its variance is that of the minimum-variance combination plus that of the difference between the two, because a
+    difference between gyros is not correlated with the minimum-variance combination.
+    """
+    variances = shared_variances(array, parameters, False)
+    rate = median(array, parameters).rate
+    weights = variances.sample_weights()
+    difference = rate - weights.combine(array.rate)[0]
+    colour = variances.colour()
+    extra = float(np.mean(np.square(np.diff(difference)))) / (2.0 * (1.0 - colour))
+    variance = float(np.mean(variances.combined_variance())) + extra
+    return smoothed(array, parameters, Signal(rate, variance, colour, None, ""))
+
+
+def parity_smoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
+    """Minimum-variance weights of the constant parity variances, smoothed."""
+    return smoothed(array, parameters, _weighted(array, shared_variances(array, parameters, False)))
+
+
+def residual_smoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
+    """Minimum-variance weights of the changing residual variances R_t, smoothed with R_t; faults are left out."""
+    return smoothed(array, parameters, _weighted(array, shared_variances(array, parameters, True)))
+
+
+def _weighted(array: ArrayRates, variances: Variances) -> Signal:
+    weights = variances.sample_weights()
+    variance = variances.combined_variance()[variances.block_of_sample()]
+    return Signal(weights.combine(array.rate)[0], variance, variances.colour(), weights, variances.note)
+
+
+def dcc_smoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
+    """Liu's in-sample DCC weights of the residual, smoothed with the variance that the model gives them."""
+    weighed = conditional(*DCC[:2])(array, FilterParameters(definition=DCC[2]))
+    if DCC not in array.deviations:
+        raise CannotRun(array.no_weights.get(DCC, "there are no conditional deviations of the residual"))
+    assert isinstance(weighed.weights, SampleWeights)
+    variances = shared_variances(array, parameters, False)
+    length = max(1, round(array.rate_hz / parameters.block_hz))
+    variance = _of_blocks(weighed.weights, array.deviations[DCC], length)
+    unknown = ~np.isfinite(variance)
+    variance[unknown] = variances.combined_variance(np.full(variances.gyros, 1.0 / variances.gyros)).mean()
+    return smoothed(
+        array, parameters, Signal(weighed.rate, variance, variances.colour(), weighed.weights, weighed.note)
+    )
+
+
+def _of_blocks(weights: SampleWeights, deviations: SampleWeights, length: int) -> np.ndarray:
+    """Variance [T] of a sample of Σw·y, from the standard deviations of means over `length` samples; NaN: not known."""
+    variance, first = np.empty(len(weights.block)), 0
+    for share, deviation in zip(weights.pieces(), deviations.pieces(), strict=True):
+        rows = slice(first, first + len(share))
+        variance[rows] = length * np.einsum("ti,ti->t", share**2, deviation**2)
+        first = rows.stop
+    variance[weights.block < 0] = math.nan
+    return variance
+
+
+def smoothed(
+    array: ArrayRates, parameters: FilterParameters, signal: Signal, slow_variance: np.ndarray | None = None
+) -> Fused:
+    """Smooth a fused rate. slow_variance [T] : of its slow error, (deg/s)², which no smoothing takes away.
+
+    raises : CannotRun where no model of the motion can be fitted
+    """
+    try:
+        if parameters.in_motion:
+            result = _in_motion(array, parameters, signal)
+            variance = result.variance
+        else:
+            result, variance = _at_rest(array, parameters, signal)
+    except DataError as reason:
+        raise CannotRun(reason.what, reason.where, reason.remedy) from None
+    if slow_variance is not None:
+        variance = variance + slow_variance
+    notes = [result.parameters, REST_NOTE if not parameters.in_motion else "", signal.note]
+    return Fused(
+        result.rate,
+        signal.weights,
+        dc_gain=1.0,
+        bandwidth_hz=result.bandwidth_hz,
+        noise_bandwidth_hz=result.noise_bandwidth_hz,
+        delay_s=0.0,
+        note="; ".join(note for note in notes if note),
+        passes=result.passes,
+        sd=np.sqrt(variance, dtype=np.float32) if slow_variance is not None else None,
+    )
+
+
+def _in_motion(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Smoothed:
+    resting = bool(array.at_rest.any())
+    motion = choose_motion(
+        signal.rate, signal.variance, array.segment, array.rate_hz, signal.colour, parameters.motion_models,
+        parameters.engine, ~array.at_rest if resting else None,
+    )  # fmt: skip
+    rest = fixed_bandwidth(parameters.bandwidth_hz, float(np.mean(signal.variance)), array.rate_hz) if resting else None
+    return smooth(
+        signal.rate, signal.variance, array.segment, array.rate_hz, motion, signal.colour, parameters.engine,
+        array.at_rest if resting else None, rest,
+    )  # fmt: skip
+
+
+def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> tuple[Smoothed, np.ndarray]:
+    """The smoother of a fixed bandwidth, and the variance [T] of what it gives where the noise changes."""
+    mean = float(np.mean(signal.variance))
+    motion = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)
+    result = smooth(signal.rate, mean, array.segment, array.rate_hz, motion, 0.0, parameters.engine)
+    share = np.broadcast_to(np.asarray(signal.variance) / mean, array.segment.shape)
+    if math.isfinite(result.bandwidth_hz) and result.passes:
+        share = _around(array, share, result.bandwidth_hz, parameters.engine)
+    return result, result.variance * share
+
+
+def _around(array: ArrayRates, values: np.ndarray, bandwidth_hz: float, engine: str) -> np.ndarray:
+    """Mean of `values` [T] under the square of the smoother's two-sided exponential, in each stretch."""
+    # Both passes together fall to -3 dB at bandwidth_hz where each has its pole at bandwidth_hz/√(√2 - 1).
+    pole = 2.0 * math.pi * bandwidth_hz / math.sqrt(math.sqrt(2.0) - 1.0)
+    keep = math.exp(-2.0 * pole * array.period)
+    low_pass = engines.get(engine).kalman.low_pass
+    around = np.empty(len(values))
+    for part in array.stretches():
+        piece = np.ascontiguousarray(values[part], dtype=float)
+        forward = low_pass(piece, keep, 1.0 - keep, float(piece[0]))
+        back = low_pass(piece[::-1], keep, 1.0 - keep, float(piece[-1]))[::-1]
+        around[part] = (forward + back - (1.0 - keep) * piece) / (1.0 + keep)
+    return around
