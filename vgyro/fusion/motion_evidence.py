@@ -23,7 +23,7 @@ RUNS = 16
 SHORTEST = 32
 SKIP = 16
 """First samples of each stretch that are given, not predicted: the same for every model, wherever it starts."""
-WIDE = 1e6
+WIDE = 1e5
 """Variance of a start that counts as knowing nothing, over that of the noise."""
 
 

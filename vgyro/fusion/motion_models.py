@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -166,7 +167,7 @@ def _oscillator(frequency_hz: float, damping: float, sd: float, q: float, period
         Q = np.diag(stationary) - F * stationary @ F.T
     else:
         # The difference above would cancel; the integral of a square does not. Its integrand is smooth over a period.
-        nodes, weights = np.polynomial.legendre.leggauss(24)
+        nodes, weights = _gauss(24)
         rise, slope, _ = _impulse_response(0.5 * period * (nodes + 1.0), omega, damping)
         rows = scale[:, None] * np.array([rise, slope])
         Q = 4.0 * damping * omega**3 * sd**2 * 0.5 * period * (rows * weights) @ rows.T
@@ -187,12 +188,12 @@ def _pair(
     from scipy.linalg import expm, solve_continuous_lyapunov
 
     omega = 2.0 * math.pi * math.sqrt(frequency_hz * second_hz)
-    sections = [
+    first, second = (
         [1.0, 2.0 * loss * 2.0 * math.pi * own / omega, (2.0 * math.pi * own / omega) ** 2]
         for own, loss in ((frequency_hz, damping), (second_hz, second_damping))
-    ]
+    )
     A = np.diag(np.ones(3), 1)
-    A[3] = -np.convolve(*sections)[:0:-1]
+    A[3] = -np.convolve(first, second)[:0:-1]
     drive = np.diag([0.0, 0.0, 0.0, 1.0])
     stationary = solve_continuous_lyapunov(A, -drive)
     stationary *= sd**2 / stationary[0, 0]
@@ -207,6 +208,13 @@ def _pair(
     return Dynamics(
         F, 0.5 * (Q + Q.T), np.eye(4)[0], 0.5 * (stationary + stationary.T) * np.outer(scale, scale), np.arange(4)
     )
+
+
+@cache
+def _gauss(nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places and weights of Gauss and Legendre's rule on [-1, 1]."""
+    places, weights = np.polynomial.legendre.leggauss(nodes)
+    return places, weights
 
 
 def _impulse_response(time: np.ndarray, omega: float, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -157,9 +157,12 @@ def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -
 def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np.ndarray:
     """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
 
-    With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero.
+    With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero;
+    of two of them all that is known is how large the derivatives are.
     """
     values = motion.parameters
+    if "second_hz" in values:
+        return np.diagonal(dynamics.stationary)
     if motion.model == "oscillator":
         q = 4.0 * values["damping"] * (2.0 * math.pi * values["frequency_hz"]) ** 3 * values["sd"] ** 2
         factors = np.array([0.0, 0.0, math.sqrt(2.0)])
