@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,13 +13,16 @@ from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_model import Evidence, empirical_prior, log_likelihood, log_likelihood_slope, walk_covariance
 from vgyro.fusion.slow_smoother import Filtered, Information
 
-MOST_BLOCKS, WINDOWS = 2000, 10
+MOST_BLOCKS, WINDOWS = 1000, 5
 """K is chosen on at most about so many blocks, in windows spread over the recording."""
 FINENESS = 8.0
 """Blocks are merged to this part of the time in which the fastest walk is as large as the white noise."""
 FASTEST = 10.0
 """Fastest K: over a block the walk is so many times as large as the white noise of the block's mean."""
 STARTS, PRECISION, ROUNDS = 9, 0.05, 30
+"""Scales tried at a time, and again between the neighbours of the best; precision and trials of each log K."""
+ALIKE = 3.0
+"""Factor by which the ratios of the K of the gyros differ from those that are known, one standard deviation."""
 SIGNIFICANT = 0.95
 """Another K is believed from this quantile of chi² on, with as many degrees of freedom as there are more parameters."""
 BROAD = 100.0
@@ -30,7 +33,7 @@ BROAD = 100.0
 class Walk:
     """What was chosen.
 
-    rrw : K [N], deg/s/√s, as used;  gain : 2Δ log likelihood of them over those given
+    rrw : K [N], deg/s/√s, as used;  gain : 2Δ log likelihood of them over those given, less what other ratios cost
     how : as given; all of one size or multiplied by one number; each by its own
     """
 
@@ -116,7 +119,7 @@ class _Search:
     def best(self, tune: bool, slopes: bool) -> Walk:
         """The K with the highest likelihood, with or without temperature slopes.
 
-        As given; all multiplied by one number, or of one size where none is known; or each its own: the more, the more
+        As given; all multiplied by one number, or of one size; or each its own: the more, the more
         likelihood they must gain.
         """
         from scipy.stats import chi2
@@ -126,41 +129,56 @@ class _Search:
             return walk
         part = self.information if slopes else self.information.first_regressors(len(self.given))
         least, most = self.bounds
-        shape = self.given / self.given.max() if self.given.any() else np.ones(len(self.given))
-        start = self._likelihood(part, self.given)[0]
-        scale, highest = _highest(lambda one: self._likelihood(part, one * shape)[0], self.bounds)
-        if 2.0 * (highest - start) > chi2.ppf(SIGNIFICANT, 1):
-            walk = Walk(scale * shape, 2.0 * (highest - start), "together")
+        start, one_size = self._likelihoods(part, self.given[None])[0], np.ones(len(self.given))
+        for shape in (self.given / self.given.max(), one_size) if self.given.any() else (one_size,):
+            scale, highest = self._together(part, shape)
+            if 2.0 * (highest - start) > max(walk.gain, chi2.ppf(SIGNIFICANT, 1)):
+                walk = Walk(scale * shape, 2.0 * (highest - start), "together")
         each, own = self._each(part, np.clip(walk.rrw, least, most))
         more = 2.0 * (own - start) - walk.gain
-        if more > chi2.ppf(SIGNIFICANT, len(shape)):
+        if more > chi2.ppf(SIGNIFICANT, len(one_size)):
             walk = Walk(each, walk.gain + more, "each")
         return walk
 
+    def _together(self, part: Information, shape: np.ndarray) -> tuple[float, float]:
+        """The multiple of `shape` [N] with the highest likelihood, and its logarithm."""
+        return _highest(lambda scales: self._likelihoods(part, np.outer(scales, shape)), self.bounds)
+
     def _each(self, part: Information, start: np.ndarray) -> tuple[np.ndarray, float]:
-        """K [N] with the highest likelihood near `start`, and that likelihood."""
+        """K [N] with the highest likelihood, and its logarithm, less what holds their ratios to those of `start`.
+
+        The ratios are log-normal about those of `start`, of a factor ALIKE: what the likelihood leaves open is not at
+        the end of its range.
+        """
         from scipy.optimize import minimize
 
         def negative(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
-            value, slope = self._likelihood(part, np.exp(logarithms), slope=True)
-            return -value, -slope
+            value, slope = self._likelihood(part, np.exp(logarithms))
+            other = (logarithms - np.log(start)) / math.log(ALIKE)
+            other -= other.mean()
+            return 0.5 * float(other @ other) - value, other / math.log(ALIKE) - slope
 
         limits = [tuple(np.log(self.bounds))] * len(start)
-        options = {"maxiter": ROUNDS, "maxfun": 2 * ROUNDS, "ftol": 1e-7, "gtol": PRECISION}
+        options = {"maxiter": ROUNDS, "maxfun": 2 * ROUNDS, "ftol": 1e-5, "gtol": PRECISION}
         found = minimize(negative, np.log(start), jac=True, method="L-BFGS-B", bounds=limits, options=options)
         return np.exp(found.x), -float(found.fun)
 
-    def _likelihood(self, part: Information, rrw: np.ndarray, slope: bool = False) -> tuple[float, np.ndarray]:
-        """Log likelihood of K [N], and its derivatives by log K [N] if they are asked for."""
+    def _likelihoods(self, part: Information, rrws: np.ndarray) -> list[float]:
+        """Log likelihoods of several K [S, N]."""
+        walks = np.stack([walk_covariance(one, self.correlation) for one in rrws])
+        return [self._of(filtered)[1] for filtered in self.evidence.filtered_with(part, walks)]
+
+    def _likelihood(self, part: Information, rrw: np.ndarray) -> tuple[float, np.ndarray]:
+        """Log likelihood of K [N], and its derivatives by log K [N]."""
         filtered = self.evidence.filtered(part, walk_covariance(rrw, self.correlation))
-        prior, value = self.broad, math.nan
-        if len(filtered.squares) > 1 + len(rrw):
-            prior, value = _best_slopes(filtered, self.broad)
-        else:
-            value = log_likelihood(filtered, prior)
-        if not slope:
-            return value, np.zeros(0)
+        prior, value = self._of(filtered)
         return value, log_likelihood_slope(part, filtered, prior, rrw, self.correlation)
+
+    def _of(self, filtered: Filtered) -> tuple[np.ndarray, float]:
+        """Prior of the constants and log likelihood, with the best variance of temperature slopes if there are any."""
+        if len(filtered.squares) > 1 + len(self.broad):
+            return _best_slopes(filtered, self.broad)
+        return self.broad, log_likelihood(filtered, self.broad)
 
     def filtered(self, information: Information, walk: Walk) -> Filtered:
         """All blocks, with a walk."""
@@ -183,17 +201,24 @@ def _thinned(blocks: SlowBlocks, crossing: float) -> tuple[np.ndarray, np.ndarra
     return kept, np.flatnonzero(starts[kept])
 
 
-def _highest(likelihood: Callable[[float], float], bounds: tuple[float, float]) -> tuple[float, float]:
-    """Where a function of a positive scale is highest, and its value there; tried at some scales, then refined."""
-    from scipy.optimize import minimize_scalar
+def _highest(values: Callable[[np.ndarray], Sequence[float]], bounds: tuple[float, float]) -> tuple[float, float]:
+    """Where a function of a positive scale is highest, and its value there.
 
-    grid = np.linspace(math.log(bounds[0]), math.log(bounds[1]), STARTS)
-    top = int(np.argmax([likelihood(math.exp(one)) for one in grid]))
-    near = (grid[max(top - 1, 0)], grid[min(top + 1, STARTS - 1)])
-    found = minimize_scalar(
-        lambda one: -likelihood(math.exp(one)), bounds=near, method="bounded", options={"xatol": PRECISION}
-    )
-    return math.exp(float(found.x)), -float(found.fun)
+    values : scales [S] → the function at each. Tried evenly in the logarithm, again between the neighbours of the
+    best, and a parabola through the best three.
+    """
+    low, high = math.log(bounds[0]), math.log(bounds[1])
+    for _ in range(2):
+        grid = np.linspace(low, high, STARTS)
+        found = np.asarray(values(np.exp(grid)))
+        top = int(np.argmax(found))
+        low, high = grid[max(top - 1, 0)], grid[min(top + 1, STARTS - 1)]
+    if top in (0, STARTS - 1):
+        return math.exp(grid[top]), float(found[top])
+    before, best, after = found[top - 1 : top + 2]
+    bend = before - 2 * best + after
+    shift = (before - after) / (2 * bend) if bend < 0 else 0.0
+    return math.exp(grid[top] + shift * (grid[1] - grid[0])), float(best + (after - before) * shift / 4)
 
 
 def _best_slopes(filtered: Filtered, broad: np.ndarray) -> tuple[np.ndarray, float]:
@@ -206,6 +231,10 @@ def _best_slopes(filtered: Filtered, broad: np.ndarray) -> tuple[np.ndarray, flo
 
     if seen <= 0:
         return prior(0.0), log_likelihood(filtered, prior(0.0))
+
+    def values(variances: np.ndarray) -> list[float]:
+        return [log_likelihood(filtered, prior(one)) for one in variances]
+
     # From slopes that the data could hardly show to those ten thousand times as large.
-    variance, value = _highest(lambda one: log_likelihood(filtered, prior(one)), (1e-2 / seen, 1e6 / seen))
+    variance, value = _highest(values, (1e-2 / seen, 1e6 / seen))
     return prior(variance), value

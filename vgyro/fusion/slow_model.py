@@ -14,7 +14,7 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filter
+from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filters
 
 FREEDOM = 2.0
 """Degrees of freedom ν of the initial biases' Student distribution. Above N - 2 one gyro however far off is believed
@@ -88,12 +88,18 @@ class Evidence:
         return Information(self.weight, vector, total, np.diff(self.time, prepend=self.time[:1]), self.jump)
 
     def filtered(self, information: Information, walk: np.ndarray) -> Filtered:
-        """The filter's forward pass.
+        """The filter's forward pass with one walk [N, N]."""
+        return self.filtered_with(information, walk[None])[0]
+
+    def filtered_with(self, information: Information, walks: np.ndarray) -> list[Filtered]:
+        """The filter's forward pass with each of several walks [S, N, N].
 
         What rounding takes for information on the constants, or against it, is taken out: without anchors their common
         parts are not seen at all, and nowhere is there less than none.
         """
-        filtered = run_filter(information, walk)
+        return [self._cleared(filtered) for filtered in run_filters(information, walks)]
+
+    def _cleared(self, filtered: Filtered) -> Filtered:
         gyros = self.means.shape[1]
         squares = filtered.squares.copy()
         for start in range(1, len(squares), gyros) if not self.anchored else ():

@@ -62,27 +62,32 @@ class Filtered:
         return replace(self, state=self.state[..., kept], squares=self.squares[kept, kept])
 
 
-def run_filter(blocks: Information, walk: np.ndarray) -> Filtered:
-    """Forward pass: P ← P + Q, L = (I + PG)⁻¹, P ← LP, x ← Lx + P·Gy.
+def run_filters(blocks: Information, walks: np.ndarray) -> list[Filtered]:
+    """Forward pass with each of several walks: P ← P + Q, L = (I + PG)⁻¹, P ← LP, x ← Lx + P·Gy.
 
-    blocks  : B blocks of measurements;  walk [N, N], (deg/s)²/s: Q_t = walk·gap_t + diag(jump_t)
+    blocks  : B blocks of measurements;  walks [S, N, N], (deg/s)²/s: Q_t = walk·gap_t + diag(jump_t)
     The covariance form of the update with G singular: Bayard & Ploen, US 2003/0187623, where G is that of the parity.
     """
     number, states, columns = blocks.vector.shape
-    state, covariance = np.empty((number, states, columns)), np.empty((number, states, states))
-    keep, one = np.empty((number, states, states)), np.eye(states)
-    x, P = np.zeros((states, columns)), np.zeros((states, states))
+    many = len(walks)
+    state, covariance = np.empty((number, many, states, columns)), np.empty((number, many, states, states))
+    keep, one = np.empty((number, many, states, states)), np.eye(states)
+    x, P = np.zeros((many, states, columns)), np.zeros((many, states, states))
     jumps = set(np.flatnonzero(blocks.jump.any(axis=1)).tolist())
     for index, gap in enumerate(blocks.gap.tolist()):
-        P = P + gap * walk
+        P = P + gap * walks
         if index in jumps:
             P = P + np.diag(blocks.jump[index])
         state[index], covariance[index] = x, P
         L = np.linalg.inv(one + P @ blocks.matrix[index])
         keep[index] = L
         P = L @ P
-        P = (P + P.T) * 0.5
+        P = (P + P.transpose(0, 2, 1)) * 0.5
         x = L @ x + P @ blocks.vector[index]
+    return [_filtered(blocks, *(part[:, index] for part in (state, covariance, keep))) for index in range(many)]
+
+
+def _filtered(blocks: Information, state: np.ndarray, covariance: np.ndarray, keep: np.ndarray) -> Filtered:
     squares = blocks.total - _fitted(blocks, state, keep @ covariance)
     return Filtered(state, covariance, keep, squares, -float(np.linalg.slogdet(keep)[1].sum()))
 

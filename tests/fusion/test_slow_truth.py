@@ -1,0 +1,300 @@
+"""Slow errors against simulated truth, and the frequency-dependent weights against their closed form."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+from scipy.stats import t as student
+
+from vgyro.fusion import ArrayNoise, ArrayRates, CannotRun, FilterParameters
+from vgyro.fusion.events import FaultEvent
+from vgyro.fusion.slow import combined_without, slow_errors, slow_variance
+from vgyro.fusion.slow_blocks import SlowBlocks
+from vgyro.fusion.slow_choice import _Search
+from vgyro.fusion.slow_model import Evidence
+from vgyro.fusion.slow_rows import frequency_weights, weights_at
+from vgyro.units import rrw_deg_s_rt_s
+
+MOVING = FilterParameters(in_motion=True)
+SEEDS = range(8)
+ARW = np.array([0.01, 0.02, 0.03, 0.01, 0.02, 0.03])
+RRW = np.array([3.0, 1.0, 2.0, 0.5, 1.0, 0.2]) * 1e-3
+EQUAL = np.full(6, 1 / 6)
+
+
+@pytest.fixture
+def simulated():
+    """simulated(seconds, seed, ...) → recording in motion at 1 Hz, and the true biases [T, N]."""
+
+    def make(seconds, seed, arw=ARW, rrw=RRW, spread=0.1, at_rest=None, temperature=None, slopes=0.0):
+        rng, gyros = np.random.default_rng(seed), len(arw)
+        bias = spread * rng.standard_normal(gyros) + np.cumsum(rng.standard_normal((seconds, gyros)) * rrw, axis=0)
+        if temperature is not None:
+            bias = bias + slopes * (temperature - temperature.mean())[:, None]
+        at_rest = np.zeros(seconds, dtype=bool) if at_rest is None else at_rest
+        motion = np.where(at_rest, 0.0, 20.0 * np.sin(np.arange(seconds) / 3.0))
+        rate = bias + motion[:, None] + rng.standard_normal((seconds, gyros)) * arw
+        noise = ArrayNoise(arw, rrw, np.eye(gyros))
+        segment = np.zeros(seconds, dtype=int)
+        return ArrayRates(rate, 1.0, segment, at_rest, noise, temperature=temperature), bias
+
+    return make
+
+
+def interval(values):
+    """95 % interval of the mean of independent values."""
+    values = np.asarray(values)
+    half = student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
+    return values.mean() - half, values.mean() + half
+
+
+def test_weights_at_a_frequency():
+    # Expected: 1/(N² + K²/(2πf)²) by hand; far above and below, the inverse squares of N and of K.
+    arw, rrw = np.array([0.1, 0.2, 0.4]), np.array([0.03, 0.01, 0.02])
+    found = weights_at(np.array([1e-9, 0.02, 1e9]), arw, rrw, np.eye(3))
+    for weights, density in zip(found, (rrw**2, arw**2 + (rrw / (2 * np.pi * 0.02)) ** 2, arw**2), strict=True):
+        np.testing.assert_allclose(weights, 1 / density / np.sum(1 / density), rtol=1e-9)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.3])
+@pytest.mark.parametrize("cycles", [20, 80, 400])
+def test_gain_of_one_gyro(simulated, cycles, correlation):
+    # Expected: weights_at: in the middle of a long recording a sine of one gyro alone comes out with its weight there.
+    arw, rrw = np.array([0.05, 0.1, 0.08]), np.array([1.5, 0.5, 1.0]) * 1e-3
+    array, _ = simulated(40_000, 3, arw, rrw)
+    matrix = (1 - correlation) * np.eye(3) + correlation
+    array = replace(array, noise=replace(array.noise, correlation=matrix))
+    u = weights_at(np.array([1e9]), arw, rrw, matrix)[0]
+    wave = 0.1 * np.exp(2j * np.pi * cycles * np.arange(40_000) / 20_000)
+    middle = slice(10_000, 30_000)
+    expected = weights_at(np.array([cycles / 20_000]), arw, rrw, matrix)[0]
+    still = combined_without(array, u, slow_errors(array, MOVING, arw**2, tune=False))
+    for gyro in range(3):
+        rate = array.rate.copy()
+        rate[:, gyro] += wave.real
+        moved = replace(array, rate=rate)
+        z = combined_without(moved, u, slow_errors(moved, MOVING, arw**2, tune=False)) - still
+        gain = 2 * np.mean(z[middle] * wave.conj()[middle]) / 0.01
+        assert gain == pytest.approx(expected[gyro], abs=1e-3)
+
+
+def test_a_motion_passes_the_row(simulated):
+    # Expected: the motion, to rounding: Σw = 1 at every frequency.
+    array, _ = simulated(3000, 1)
+    motion = np.cumsum(np.random.default_rng(0).standard_normal(3000))
+    one, other = (frequency_weights(a, MOVING) for a in (array, replace(array, rate=array.rate + motion[:, None])))
+    np.testing.assert_allclose(other.rate - one.rate, motion, atol=1e-10)
+    assert one.dc_gain == 1.0
+    assert one.weights.sum() == pytest.approx(1.0)
+
+
+def test_less_drift_than_inverse_variance(simulated):
+    # Expected: true rate known. Inverse variance weights the white noise alone; the gyros drift otherwise than that.
+    ratios = []
+    for seed in SEEDS:
+        array, _ = simulated(3600, seed)
+        truth = 20.0 * np.sin(np.arange(3600) / 3.0)
+        inverse = ARW**-2 / np.sum(ARW**-2)
+        errors = [
+            (z - truth).reshape(60, 60).mean(axis=1)
+            for z in (frequency_weights(array, MOVING).rate, array.rate @ inverse)
+        ]
+        ratios.append(np.std(errors[0]) / np.std(errors[1]))
+    assert interval(ratios)[1] < 1.0
+
+
+def test_error_between_two_rests(simulated):
+    # Expected: the walk that all share is pinned at both ends, a Brownian bridge: the mean of its error over the motion
+    # of T has the variance k²T/12 + P/2, at the middle k²T/4 + P/2; k = K/√N, n = ARW/√N, and P = k·n·coth(kτ/n) is
+    # what a rest of τ leaves open at its end. 200 recordings: 10 % is the standard deviation of a variance.
+    K, arw, rest, motion = rrw_deg_s_rt_s(200.0), 0.02, 60, 1200
+    at_rest = np.ones(motion + 2 * rest, dtype=bool)
+    at_rest[rest:-rest] = False
+    means, middles = [], []
+    for seed in range(200):
+        array, bias = simulated(len(at_rest), seed, np.full(6, arw), np.full(6, K), at_rest=at_rest)
+        blocks = SlowBlocks.of(array, 5.0)
+        slow = slow_errors(array, MOVING, array.noise.arw**2, blocks=blocks, tune=False)
+        error = (slow.at_samples(slow.bias @ EQUAL) - bias @ EQUAL)[~at_rest]
+        means.append(error.mean())
+        middles.append(error[motion // 2])
+    k, n = K / np.sqrt(6), arw / np.sqrt(6)
+    end = k * n / np.tanh(k * rest / n) / 2
+    assert np.mean(np.square(means)) == pytest.approx(k**2 * motion / 12 + end, rel=0.3)
+    assert np.mean(np.square(middles)) == pytest.approx(k**2 * motion / 4 + end, rel=0.3)
+    # What it says of itself, without chance; half a block of rest more or less.
+    stated = slow_variance(EQUAL, slow)[len(blocks) // 2]
+    assert stated == pytest.approx(k**2 * motion / 4 + end, rel=0.02)
+
+
+def test_errors_are_as_large_as_stated_between_anchors(simulated):
+    # Expected: error²/variance of 1 on average, over the whole recording (NEES), for two sets of weights.
+    at_rest = np.zeros(300, dtype=bool)
+    at_rest[:20], at_rest[140:160], at_rest[-20:] = True, True, True
+    for weights in (EQUAL, np.array([0.5, -0.2, 0.3, 0.2, 0.1, 0.1])):
+        ratios = []
+        for seed in range(60):
+            array, bias = simulated(300, seed, at_rest=at_rest)
+            slow = slow_errors(array, MOVING, ARW**2, tune=False)
+            ratios.append(np.mean(((slow.bias - bias) @ weights) ** 2 / slow_variance(weights, slow)))
+        low, high = interval(ratios)
+        assert low < 1.0 < high
+
+
+def test_differences_are_as_large_as_stated_in_motion(simulated):
+    # Expected: NEES of 1 on average, of combinations in which what all share has no part.
+    weights = np.array([0.5, 0.5, 0.0, 0.0, -0.5, -0.5])
+    ratios = []
+    for seed in range(60):
+        array, bias = simulated(300, seed)
+        slow = slow_errors(array, MOVING, ARW**2, tune=False)
+        ratios.append(np.mean(((slow.bias - bias) @ weights) ** 2 / slow_variance(weights, slow)))
+    low, high = interval(ratios)
+    assert low < 1.0 < high
+
+
+def test_the_common_bias_lies_in_its_limits(simulated):
+    # Expected: the mean bias of all gyros within 1.96 s.d. in about 95 % of 300 recordings (binomial s.d. 1.3 %),
+    # though nothing but the gyros' own spread says how large it may be.
+    inside = []
+    for seed in range(300):
+        array, bias = simulated(40, seed, spread=1.0)
+        slow = slow_errors(array, MOVING, ARW**2, tune=False)
+        inside.append(abs((slow.bias - bias) @ EQUAL)[20] < 1.96 * np.sqrt(slow_variance(EQUAL, slow)[20]))
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.04)
+
+
+def test_one_gyro_far_off_does_not_drag_the_rest(simulated):
+    # Expected: the rate that the other five give without it, within their own s.d. of the common bias.
+    array, bias = simulated(200, 2)
+    off = replace(array, rate=array.rate + np.array([0, 0, 0, 5.0, 0, 0]))
+    alone = replace(
+        array, rate=np.delete(array.rate, 3, axis=1), noise=ArrayNoise(np.delete(ARW, 3), np.delete(RRW, 3), np.eye(5))
+    )
+    slow = slow_errors(off, MOVING, ARW**2, tune=False)
+    five = slow_errors(alone, MOVING, alone.noise.arw**2, tune=False)
+    shift = np.mean(np.delete(slow.bias[0], 3)) - np.mean(five.bias[0])
+    assert abs(shift) < np.sqrt(slow_variance(np.full(5, 0.2), five)[0])
+    assert slow.bias[0, 3] - bias[0, 3] == pytest.approx(5.0, abs=0.2)
+
+
+def test_temperature_slopes_are_found(simulated):
+    # Expected: differences of the true slopes, (found - true)/s.d. of mean square 1 over 8 seeds and 5 differences; and
+    # with standstill their mean as well.
+    slopes = np.array([0.03, -0.02, 0.01, 0.05, -0.04, 0.0])
+    temperature = 30.0 + 6.0 * np.sin(np.arange(3000) / 150.0)
+    at_rest = np.arange(3000) % 600 < 60
+    squares, common = [], []
+    for seed in SEEDS:
+        array, _ = simulated(3000, seed, temperature=temperature, slopes=slopes)
+        found = slow_errors(array, MOVING, ARW**2).temperature
+        contrast = np.diff(np.eye(6), axis=0)
+        error, covariance = contrast @ (found.slope - slopes), contrast @ found.covariance @ contrast.T
+        squares.append(error @ np.linalg.solve(covariance, error) / 5)
+        resting, _ = simulated(3000, seed, at_rest=at_rest, temperature=temperature, slopes=slopes)
+        found = slow_errors(resting, MOVING, ARW**2).temperature
+        common.append((found.slope - slopes).mean() / np.sqrt(EQUAL @ found.covariance @ EQUAL))
+    # chi² of 40 degrees of freedom over 40, 99 %: 0.55 to 1.65; of 8 over 8: 0.17 to 2.7.
+    assert 0.55 < np.mean(squares) < 1.65
+    assert 0.17 < np.mean(np.square(common)) < 2.7
+
+
+def test_drift_is_not_taken_for_temperature(simulated):
+    # Expected: no slopes, for there are none, though the temperature drifts as the biases do. K is not known well.
+    temperature = 30.0 + 10.0 * np.linspace(0, 1, 3000) ** 0.5
+    for seed in SEEDS:
+        array, _ = simulated(3000, seed, temperature=temperature)
+        array = replace(array, noise=replace(array.noise, rrw=RRW / 3))
+        slow = slow_errors(array, MOVING, ARW**2)
+        assert slow.temperature is None
+        assert "not regressed on the temperature" in slow.note
+
+
+def test_when_the_temperature_is_not_used(simulated):
+    array, _ = simulated(300, 1, temperature=30.0 + 0.4 * np.sin(np.arange(300) / 30.0))
+    assert "temperature within 0.8 K: not regressed on" in slow_errors(array, MOVING, ARW**2).note
+    assert "temperature is off" in slow_errors(array, replace(MOVING, temperature="off"), ARW**2).note
+    holes = replace(array, temperature=np.where(np.arange(300) < 5, np.nan, array.temperature))
+    assert "temperature unknown in 5 of 300 blocks" in slow_errors(holes, MOVING, ARW**2).note
+
+
+def test_slope_of_the_likelihood(simulated):
+    # Expected: differences of the likelihood itself (scipy), with and without regressors of the temperature.
+    temperature = 30.0 + 6.0 * np.sin(np.arange(400) / 30.0)
+    array, _ = simulated(400, 4, temperature=temperature, slopes=np.linspace(0, 0.1, 6))
+    blocks, none = SlowBlocks.of(array), np.zeros(400, dtype=bool)
+    noise = 0.8 * np.eye(6) + 0.2
+    evidence = Evidence.of(array, blocks, np.broadcast_to(ARW**2, (400, 6)), noise, none, temperature - 30.0)
+    search = _Search.of(evidence, blocks, RRW, noise, ARW)
+    for part in (search.information, search.information.first_regressors(6)):
+        _, found = search._likelihood(part, RRW)
+        expected = approx_fprime(np.log(RRW), lambda one, part=part: search._likelihood(part, np.exp(one))[0], 1e-5)
+        np.testing.assert_allclose(found, expected, atol=2e-2 * abs(expected).max())
+
+
+def test_random_walks_by_likelihood(simulated):
+    # Expected: the true K. Given three times as large, or not at all; the multiplier within 20 % on average.
+    known, unknown = [], []
+    for seed in SEEDS:
+        array, _ = simulated(3000, seed, np.full(6, 0.02), np.full(6, 1e-3))
+        for rrw, found in ((np.full(6, 3e-3), known), (np.full(6, np.nan), unknown)):
+            given = replace(array, noise=replace(array.noise, rrw=rrw))
+            slow = slow_errors(given, MOVING, array.noise.arw**2)
+            assert slow.walk.how != "given"
+            found.append(np.exp(np.mean(np.log(slow.walk.rrw))) / 1e-3)
+    for found in (known, unknown):
+        assert np.mean(found) == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_gyro_that_walks_faster_than_was_known(simulated):
+    # Expected: its K within a factor of 1.5 of the truth, and an error nearly that of who knows; as given, far larger.
+    truth = np.where(np.arange(6) == 3, 2e-2, 5e-4)
+    ratios, worse = [], []
+    for seed in SEEDS:
+        array, bias = simulated(1200, seed, np.full(6, 0.05), truth)
+        errors = []
+        for rrw, tune in ((truth, False), (np.full(6, 5e-4), True), (np.full(6, 5e-4), False)):
+            given = replace(array, noise=replace(array.noise, rrw=rrw))
+            slow = slow_errors(given, MOVING, array.noise.arw**2, tune=tune)
+            errors.append(np.std((slow.bias - bias) @ EQUAL))
+            if tune:
+                assert slow.walk.how == "each"
+                assert slow.walk.rrw[3] == pytest.approx(2e-2, rel=0.5)
+        ratios.append(errors[1] / errors[0])
+        worse.append(errors[2] / errors[0])
+    assert np.mean(ratios) < 1.25
+    assert np.mean(worse) > 3.0
+
+
+def test_a_bias_that_jumps_while_its_gyro_is_at_fault(simulated):
+    # Expected: the bias after an event that is left out is found at once, within its s.d.
+    array, bias = simulated(600, 1)
+    jumped = np.zeros((600, 6))
+    jumped[300:, 1] = 2.0
+    event = FaultEvent(1, "step", 290, 330, 20.0, 2.0, "deg/s")
+    slow = slow_errors(replace(array, rate=array.rate + jumped, faults=(event,)), MOVING, ARW**2)
+    difference = np.array([-0.2, 1.0, -0.2, -0.2, -0.2, -0.2])
+    error = (slow.bias - bias - jumped) @ difference
+    sd = np.sqrt(slow_variance(difference, slow))
+    after = slice(330, 340)
+    assert np.all(abs(error[after]) < 4 * sd[after])
+    assert np.all(sd[after] < 0.05)
+
+
+def test_the_row_needs_the_white_noise(simulated):
+    array, _ = simulated(100, 1)
+    with pytest.raises(CannotRun, match="noise covariance"):
+        frequency_weights(replace(array, noise=replace(array.noise, arw=np.full(6, np.nan))), MOVING)
+
+
+@pytest.mark.full
+def test_a_day_of_blocks(simulated):
+    # Expected: 86,400 blocks of six gyros, with temperature, in less than 15 s of one processor.
+    temperature = 30.0 + 6.0 * np.sin(np.arange(86_400) / 9000.0)
+    array, _ = simulated(86_400, 1, temperature=temperature, slopes=np.linspace(0, 0.1, 6))
+    start = time.process_time()
+    slow = slow_errors(array, MOVING, ARW**2)
+    assert time.process_time() - start < 15.0
+    assert slow.temperature is not None
