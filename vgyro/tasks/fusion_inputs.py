@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -16,9 +16,10 @@ from vgyro.config import MODELS, MODES, FusionOptions, VolatilityOptions
 from vgyro.dataset import AT_REST
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights, block_of_sample
 from vgyro.fusion.array import WeightKey
-from vgyro.storage.tables import ROW_GROUP, read_batches, read_json, read_metadata, read_rows
+from vgyro.fusion.events import FaultEvent, FaultKind
+from vgyro.storage.tables import ROW_GROUP, read_batches, read_columns, read_json, read_metadata, read_rows
 from vgyro.tasks.common import Task
-from vgyro.tasks.rates_file import ArrayFile, read_array
+from vgyro.tasks.rates_file import ArrayFile, read_array, samples_before, stretch_times
 from vgyro.tasks.volatility_series import LEVEL, MOVED
 
 T = TypeVar("T")
@@ -48,11 +49,11 @@ class OpenArray:
         """
         for column in self.rates.rate.T:
             column += self.injected_rate
-        weights = _of_moved_level(self.rates.weights)
+        weights, deviations = (_of_moved_level(known) for known in (self.rates.weights, self.rates.deviations))
         reasons: dict[WeightKey, str] = _of_moved_level(self.rates.no_weights)
         if self.volatility.rate_hz == "full":
             reasons = {(model, mode, LEVEL): NOT_AT_FULL_RATE for model in MODELS for mode in MODES}
-        return replace(self.rates, weights=weights, no_weights=reasons)
+        return replace(self.rates, weights=weights, deviations=deviations, no_weights=reasons)
 
 
 def _of_moved_level(known: Mapping[WeightKey, T]) -> dict[WeightKey, T]:
@@ -63,21 +64,63 @@ def _of_moved_level(known: Mapping[WeightKey, T]) -> dict[WeightKey, T]:
 def open_array(task: Task) -> OpenArray:
     """Read rates, noise and, where they are an input, the weights of one array.
 
-    inputs : rates, noise, weights; moved, the weights of the level with the option injected_rate (may be left out)
+    inputs : rates, noise, weights; moved, the weights of the level with the option injected_rate, and faults (both may
+             be left out)
     """
     analysis = task.options["analysis"]
     fusion = FusionOptions.model_validate(analysis.get("fusion", {}))
     volatility = VolatilityOptions.model_validate(analysis.get("volatility", {}))
-    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
+    board = Board.model_validate(task.options["board"])
+    gyros = [gyro.name for gyro in board.array(task.options["axis"])]
     file = read_array(task.input("rates"), gyros, task.options["axis"])
     tables = [*task.inputs.get("weights", []), *task.inputs.get("moved", [])]
     block_hz = file.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
-    weights, reasons = read_weights(tables, gyros, file, block_hz)
+    weights, deviations, reasons = read_weights(tables, gyros, file, block_hz)
     noise = read_noise(task.input("noise"), gyros)
-    rates = ArrayRates(file.rate, file.rate_hz, file.segment, file.at_rest, noise, weights, reasons)
+    rates = ArrayRates(
+        file.rate, file.rate_hz, file.segment, file.at_rest, noise, weights, reasons,
+        faults=tuple(event for path in task.inputs.get("faults", []) for event in read_faults(path, gyros, file)),
+        deviations=deviations,
+        temperature=read_temperature(file, thermometers(board, gyros)) if fusion.temperature == "auto" else None,
+        stretch_time=stretch_times(file),
+    )  # fmt: skip
     moving = in_motion(task.options["kind"], file.at_rest)
     parameters = FilterParameters.of(fusion, moving, block_hz, analysis.get("engine", "native"))
     return OpenArray(gyros, file, rates, parameters, fusion, volatility, task.options.get("injected_rate"))
+
+
+def read_faults(path: Path, gyros: list[str], file: ArrayFile) -> list[FaultEvent]:
+    """The events of faults.parquet in samples of the rates."""
+    rows = read_columns(path)
+    half = 0.5 / file.rate_hz
+    start = samples_before(file.path, rows["start"] - half)
+    stop = samples_before(file.path, rows["stop"] + half)
+    return [
+        FaultEvent(
+            gyros.index(str(rows["gyro"][row])), cast(FaultKind, str(rows["kind"][row])), int(start[row]),
+            int(stop[row]), float(rows["evidence"][row]), float(rows["size"][row]), str(rows["unit"][row]),
+        )
+        for row in range(len(rows["gyro"]))
+    ]  # fmt: skip
+
+
+def thermometers(board: Board, gyros: list[str]) -> list[str]:
+    """Columns of rates.parquet with the temperatures of these gyros; of the board where they have none."""
+    own = [f"temp_{one.name}" for one in board.temperatures if one.gyro in gyros]
+    return own or [f"temp_{one.name}" for one in board.temperatures if one.gyro is None]
+
+
+def read_temperature(file: ArrayFile, columns: list[str]) -> np.ndarray | None:
+    """Mean of some temperatures [T], °C, in single precision; None where there is none."""
+    columns = [name for name in columns if name in pq.read_schema(file.path).names]
+    if not columns:
+        return None
+    mean, first = np.empty(len(file.segment), dtype=np.float32), 0
+    for batch in read_batches(file.path, columns):
+        rows = slice(first, first + len(batch[columns[0]]))
+        mean[rows] = sum(batch[name] for name in columns) / len(columns)
+        first = rows.stop
+    return mean
 
 
 def in_motion(kind: str, at_rest: np.ndarray) -> bool:
@@ -98,15 +141,16 @@ def read_noise(path: Path, gyros: list[str]) -> ArrayNoise:
 
 def read_weights(
     paths: list[Path], gyros: list[str], file: ArrayFile, block_hz: float
-) -> tuple[dict[WeightKey, SampleWeights], dict[WeightKey, str]]:
-    """Weights of every model, mode and definition, ready for the samples of the rates; and why there are none.
+) -> tuple[dict[WeightKey, SampleWeights], dict[WeightKey, SampleWeights], dict[WeightKey, str]]:
+    """Weights of every model, mode and definition, ready for the samples of the rates; the deviations; why no weights.
 
     paths : weights.parquet, each in the folder that its definition names. The weights stay there until they are used.
     file  : the samples;  block_hz : rate of the volatility series
     """
     weights: dict[WeightKey, SampleWeights] = {}
     reasons: dict[WeightKey, str] = {}
-    columns = [f"w_{gyro}" for gyro in gyros]
+    deviations: dict[WeightKey, SampleWeights] = {}
+    kinds = ((weights, [f"w_{gyro}" for gyro in gyros]), (deviations, [f"sd_{gyro}" for gyro in gyros]))
     block, last = np.empty(0, dtype=np.int32), None
     for path in paths:
         metadata = read_metadata(path)
@@ -119,10 +163,12 @@ def read_weights(
         for place, (model, mode) in enumerate(metadata["blocks"]):
             key, first = (model, mode, path.parent.name), place * count
             if _any_known(path, first, count):
-                weights[key] = SampleWeights(block, partial(rows_in_order, path, columns, first), len(gyros))
+                there = pq.read_schema(path).names
+                for known, columns in ((known, columns) for known, columns in kinds if set(columns) <= set(there)):
+                    known[key] = SampleWeights(block, partial(rows_in_order, path, columns, first), len(gyros))
             else:
                 reasons[key] = str(read_rows(path, ["status"], first, first + 1)["status"][0])
-    return weights, reasons
+    return weights, deviations, reasons
 
 
 def _blocks_of_samples(path: Path, count: int, file: ArrayFile, block_hz: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -82,6 +83,30 @@ def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
             column[rows] = batch[gyro]
         first = rows.stop
     return ArrayFile(rate.T, segment, at_rest, float(metadata["rate_hz"]), path, axis)
+
+
+def stretch_times(file: ArrayFile) -> np.ndarray:
+    """Time of the first sample of each gap-free stretch [S], s."""
+    return times_at(file.path, np.append(0, np.flatnonzero(np.diff(file.segment)) + 1))
+
+
+def times_at(path: Path, samples: Sequence[int] | np.ndarray) -> np.ndarray:
+    """Times of some samples, s; the times are read piece by piece."""
+    wanted = np.asarray(samples, dtype=np.int64)
+    found, first = np.full(len(wanted), math.nan), 0
+    for batch in read_batches(path, ["time"]):
+        inside = (wanted >= first) & (wanted < first + len(batch["time"]))
+        found[inside] = batch["time"][wanted[inside] - first]
+        first += len(batch["time"])
+    return found
+
+
+def samples_before(path: Path, moments: Sequence[float] | np.ndarray) -> np.ndarray:
+    """How many samples lie before each moment, s; the times are read piece by piece."""
+    found = np.zeros(len(moments), dtype=np.int64)
+    for batch in read_batches(path, ["time"]):
+        found += np.searchsorted(batch["time"], moments)
+    return found
 
 
 @dataclass(frozen=True)

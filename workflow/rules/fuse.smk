@@ -1,3 +1,25 @@
+rule faults:
+    """Stretches in which one gyro of an array is at fault."""
+    input:
+        rates="results/{dataset}/{recording}/rates.parquet",
+        calibration="results/{dataset}/calibration.json",
+    output:
+        faults="results/{dataset}/{recording}/{axis}/faults.parquet",
+    log:
+        "results/logs/{dataset}/{recording}/{axis}/faults.log",
+    benchmark:
+        "results/benchmarks/{dataset}/{recording}/{axis}/faults.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        options=stage("board", "faults"),
+        code=code("faults"),
+    shell:
+        "python -m vgyro.tasks.faults --input rates {input.rates} --input calibration {input.calibration}"
+        " --output faults {output.faults} --options {params.options:q} --code {params.code} --log {log}"
+
+
 rule fuse:
     """One virtual gyroscope a method; at rest again with a constant rate added."""
     input:
@@ -5,6 +27,7 @@ rule fuse:
         noise="results/{dataset}/noise/{axis}.json",
         weights=weights_of,
         moved=moved_weights_of,
+        faults="results/{dataset}/{recording}/{axis}/faults.parquet",
     output:
         fused="results/{dataset}/{recording}/{axis}/fused.parquet",
         methods="results/{dataset}/{recording}/{axis}/methods.parquet",
@@ -22,6 +45,6 @@ rule fuse:
         ),
         code=code("fuse"),
     shell:
-        "python -m vgyro.tasks.fuse --input rates {input.rates} --input noise {input.noise} --input weights {input.weights:q} --input moved {input.moved:q}"
+        "python -m vgyro.tasks.fuse --input rates {input.rates} --input noise {input.noise} --input weights {input.weights:q} --input moved {input.moved:q} --input faults {input.faults}"
         " --output fused {output.fused} --output methods {output.methods} --output moved {output.moved}"
         " --options {params.options:q} --code {params.code} --log {log}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.fusion.events import FaultKind
 from vgyro.fusion.faults.candidate import Candidate, lengths_up_to
 from vgyro.fusion.faults.wander import Slow, contrasts
 
@@ -161,7 +162,7 @@ def _fault(slow: Slow, gyro: int, change: Change, evidence: float, longest_step:
         if back is None and change.last - change.first <= longest_step:
             rise = 0
     last = max(last, first + 1)
-    kind = "step" if rise <= longest_step else "drift"
+    kind: FaultKind = "step" if rise <= longest_step else "drift"
     return Candidate(gyro, kind, first, last, evidence, _size(slow.mean[first:last] - level), "deg/s")
 
 

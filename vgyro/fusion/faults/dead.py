@@ -99,7 +99,8 @@ def _usual_run(order: np.ndarray, length: int, samples: int) -> int:
     single = others - int(order.sum() - length)
     if single >= USUAL_SHARE * others:
         return 1
-    return int(order[min(np.searchsorted(held, USUAL_SHARE * others - single), len(order) - 1)])
+    place = int(np.searchsorted(held, USUAL_SHARE * others - single))
+    return int(order[min(place, len(order) - 1)])
 
 
 def _event(array: ArrayRates, gyro: int, start: int, stop: int, zero: tuple[float, float]) -> FaultEvent:

@@ -114,24 +114,34 @@ def _filled(rate: np.ndarray, weight: np.ndarray, spoilt: Sequence[Spoilt]) -> n
     for one in spoilt:
         bad[one.first : one.last, one.gyro] = True
     for first, last, gyro in _joined(spoilt):
-        around = slice(max(0, first - LEVEL_BLOCKS), min(blocks, last + LEVEL_BLOCKS))
-        usable = ~bad[around].any(axis=0)
-        if not usable.any():
-            usable = ~bad[first:last].any(axis=0)
-        usable[gyro] = False
-        if not usable.any():
-            usable = np.arange(rate.shape[1]) != gyro
-        share = np.where(usable, weight, 0.0)
-        others = rate[around] @ (share / share.sum())
-        own = np.where(bad[around, gyro], np.nan, rate[around, gyro] - others)
-        before, after = own[: first - around.start], own[last - around.start :]
-        levels = [np.median(part[~np.isnan(part)]) if (~np.isnan(part)).any() else np.nan for part in (before, after)]
-        begin, end = (levels[0], levels[1]) if np.isfinite(levels).all() else (np.nanmax([*levels, -np.inf]),) * 2
-        if not np.isfinite(begin):
-            begin = end = float(np.median(rate[:, gyro] - rate @ (share / share.sum())))
-        inside = slice(first - around.start, last - around.start)
-        filled[first:last, gyro] = others[inside] + np.linspace(begin, end, last - first)
+        low, high = max(0, first - LEVEL_BLOCKS), min(blocks, last + LEVEL_BLOCKS)
+        share = _good_share(bad, weight, gyro, ((low, high), (first, last)))
+        own = np.where(bad[:, gyro], np.nan, rate[:, gyro] - rate @ share)
+        begin, end = _level(own[low:first]), _level(own[last:high])
+        begin, end = (end if np.isnan(begin) else begin), (begin if np.isnan(end) else end)
+        if np.isnan(begin):
+            begin = end = 0.0 if np.isnan(own).all() else _level(own)
+        filled[first:last, gyro] = rate[first:last] @ share + np.linspace(begin, end, last - first)
     return filled
+
+
+def _good_share(bad: np.ndarray, weight: np.ndarray, gyro: int, spans: Sequence[Span]) -> np.ndarray:
+    """Weights [N] of the others that are good all over the first of the spans where there are any; else of all others."""
+    for first, last in spans:
+        good = ~bad[first:last].any(axis=0)
+        good[gyro] = False
+        if good.any():
+            break
+    else:
+        good = np.arange(bad.shape[1]) != gyro
+    share = np.where(good, weight, 0.0)
+    return share / share.sum()
+
+
+def _level(values: np.ndarray) -> float:
+    """Median of what is known; NaN where nothing is."""
+    known = values[~np.isnan(values)]
+    return float(np.median(known)) if known.size else float("nan")
 
 
 def _joined(spoilt: Sequence[Spoilt]) -> list[tuple[int, int, int]]:

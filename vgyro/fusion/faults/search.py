@@ -9,7 +9,7 @@ import numpy as np
 
 from vgyro.config import FaultOptions
 from vgyro.fusion.array import ArrayRates
-from vgyro.fusion.events import FAULT_KINDS, FaultEvent
+from vgyro.fusion.events import FAULT_KINDS, FaultEvent, FaultKind
 from vgyro.fusion.faults.bias import suspect_bias
 from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums
 from vgyro.fusion.faults.candidate import Candidate
@@ -183,7 +183,7 @@ def _merged(found: Sequence[Candidate], burst_blocks: float) -> list[Candidate]:
     return merged
 
 
-def _noise_kind(one: Candidate, burst_blocks: float) -> str:
+def _noise_kind(one: Candidate, burst_blocks: float) -> FaultKind:
     return "burst" if one.last - one.first < burst_blocks else "noise"
 
 

@@ -25,6 +25,7 @@ ENOUGH_BLOCKS = 50
 ENOUGH_SHARE = 0.2
 NEARBY = 4  # blocks on each side
 
+
 @dataclass(frozen=True)
 class Slow:
     """The residual of one gyro in block means, and its healthy behaviour.
