@@ -42,10 +42,10 @@ def moving() -> dict[str, Figures]:
     return {recording: dynamic(recording, SEEDS) for recording in TESTS}
 
 
-@pytest.fixture(scope="module")
-def static() -> Figures:
+def at_rest(seeds) -> Figures:
+    """The hour at rest; a smoother of another shape has no equal bandwidth."""
     found: Figures = defaultdict(lambda: defaultdict(list))
-    for seed in SEEDS:
+    for seed in seeds:
         one = case(load("jiang2012"), "static", seed, volatility=NO_DCC)
         for column, fused in run(one).fused.items():
             if table3.low_pass_of(fused).other_shape:
@@ -53,6 +53,11 @@ def static() -> Figures:
             for figure, value in table3.jiang_static(one, fused, BANDWIDTH).items():
                 found[column][figure].append(value)
     return found
+
+
+@pytest.fixture(scope="module")
+def static() -> Figures:
+    return at_rest(SEEDS)
 
 
 @pytest.mark.full

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -27,6 +29,7 @@ AXES = {
 CAPTURES = ("exp_1", "exp_2")
 
 
+@cache
 def poses(folder: Path, capture: str) -> tuple[list[str], list[np.ndarray]]:
     """Names of the gyros, and the rest poses of a capture, [n, 24] deg/s each."""
     table = pq.read_table(folder / "mimu4444-array" / f"{capture}.parquet")
@@ -72,22 +75,42 @@ def scatter(half: list[np.ndarray], weights: np.ndarray, seconds: float) -> floa
     return float(np.sqrt(squares / freedom))
 
 
-def held_out(folder: Path, axis: str, seconds: float) -> dict[str, float]:
-    """R.m.s. over captures and both directions of the s.d. on the half that the weights are not from."""
-    found: dict[str, list[float]] = {}
-    for capture in CAPTURES:
+def held_out(folder: Path, axis: str, captures: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """R.m.s. over captures and both directions of the s.d. on the half that the weights are not from.
+
+    returns : method → s.d. of the samples and of the means of 1 s, deg/s
+    """
+    found: dict[str, list[list[float]]] = {}
+    for capture in captures:
         names, every = poses(folder, capture)
         signs = [1.0 if int(name[3]) % 2 else -1.0 for name in AXES[axis]]
         columns = [names.index(name) for name in AXES[axis]]
         turned = [pose[:, columns] * signs for pose in every]
         for known, unseen in ((turned[::2], turned[1::2]), (turned[1::2], turned[::2])):
             for name, weights in weights_of(array_of(known, AXES[axis])).items():
-                found.setdefault(name, []).append(scatter(unseen, weights, seconds))
-    return {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in found.items()}
+                found.setdefault(name, []).append([scatter(unseen, weights, seconds) for seconds in (0.0, 1.0)])
+    return {name: tuple(np.sqrt(np.mean(np.square(values), axis=0))) for name, values in found.items()}
+
+
+def holds(found: dict[str, tuple[float, float]], axis: str) -> None:
+    """Ours <= inverse variance <= average at the sample rate, but for one pair.
+
+    On y the gyro of IMU 7 is bad at the sample rate and not at 1 s (tests/metrics/test_real_recordings.py). ARW does not
+    see that, so that weights from it are no better than equal ones.
+    """
+    ours, inverse, average = (found[name][0] for name in ("ours", "inverse", "average"))
+    assert ours <= inverse
+    assert ours <= average
+    if axis != "y":
+        assert inverse <= average
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_held_out_halves_of_the_rest_poses(shared_data: Path, axis: str):
-    sample = held_out(shared_data, axis, 0.0)
-    print(axis, sample, held_out(shared_data, axis, 1.0))
-    assert sample["ours"] <= sample["inverse"] <= sample["average"]
+def test_held_out_half_of_one_capture(shared_data: Path, axis: str):
+    holds(held_out(shared_data, axis, CAPTURES[:1]), axis)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("axis", AXES)
+def test_held_out_halves_of_both_captures(shared_data: Path, axis: str):
+    holds(held_out(shared_data, axis, CAPTURES), axis)
