@@ -92,6 +92,12 @@ def test_blocks_without_forecast_and_faults_do_not_count():
     assert 2500 <= score(part).blocks <= 2600
 
 
+def test_no_more_blocks_than_memory_allows(monkeypatch):
+    h, z = unsteady(900, 3, 6)
+    monkeypatch.setattr("vgyro.fusion.parity_dcc.MOST_BLOCKS", 400)
+    assert 380 <= score(array_of(np.sqrt(h) * z, np.sqrt(h))).blocks <= 400
+
+
 def test_nothing_to_compare():
     h, z = unsteady(120, 3, 4)
     array = array_of(np.sqrt(h) * z, np.sqrt(h))

@@ -11,7 +11,9 @@ from vgyro.fusion.parity_blocks import BlockMoments
 from vgyro.fusion.parity_hat import LEAST_SHARE, Best, best_weights, outliers
 from vgyro.fusion.parity_memory import Memory, chosen_memory
 
-PASSES = 3
+PASSES = 5
+CHOICES = (0, 2)
+"""Passes in which the memories are chosen; the others keep those of the pass before."""
 SETTLING = 10
 
 
@@ -37,8 +39,7 @@ def changing_variances(
     """Follow the variances through the blocks, from the constant ones [N] and their outlying blocks [M, N] on.
 
     Each pass takes the residual against the estimate with the weights of the pass before. These come from variances
-    that do not know the block's own square, so that no gyro is favoured for a square that was small by chance. The last
-    pass keeps the memories of the one before.
+    that do not know the block's own square, so that no gyro is favoured for a square that was small by chance.
     """
     alone = np.broadcast_to(constant, moments.excluded.shape)
     known = ~moments.excluded & ((~moments.excluded).sum(axis=1) > 1)[:, None]
@@ -50,7 +51,7 @@ def changing_variances(
         outlier = outliers(np.where(known, square, 0.0))
         freedom = np.where(known & ~outlier, moments.size[:, None].astype(float), 0.0)
         columns = list(zip(square.T, freedom.T, strict=True))
-        if number < PASSES - 1:
+        if number in CHOICES:
             memories = [chosen_memory(*one, block_s, low_pass) for one in columns]
         found = [memory.average(*one, low_pass) for memory, one in zip(memories, columns, strict=True)]
         variance, alone = (np.column_stack([one[place] for one in found]) for place in (0, 1))

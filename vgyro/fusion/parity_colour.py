@@ -29,19 +29,27 @@ def colour(array: ArrayRates, moments: BlockMoments, variance: np.ndarray) -> np
     standard error of φ. 0 where φ is not positive by 3 of these. Two gyros: of both together.
     """
     phi = np.zeros(array.rate.shape[1])
-    excluded, good = max(patterns(moments.excluded), key=lambda one: len(one[1]))
-    kept = np.flatnonzero(~excluded)
-    weights = _weights(variance[kept])
-    found = np.array(list(_parts(array, moments, good, kept)))
-    if len(found) < FEWEST_PARTS or len(kept) < 2:
-        return phi
+    missing = np.ones(len(phi), dtype=bool)
+    # The most frequent sets of good gyros first, until each gyro was in one.
+    for excluded, good in sorted(patterns(moments.excluded), key=lambda one: -len(one[1])):
+        kept = np.flatnonzero(~excluded)
+        if missing[kept].any() and len(kept) > 1:
+            found = _significant(np.array(list(_parts(array, moments, good, kept))), _weights(variance[kept]))
+            phi[kept] = np.where(missing[kept], found, phi[kept])
+            missing[kept] = False
+    return phi
+
+
+def _significant(parts: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """φ [K] from the second moments [P, 2, K, K] of the parts."""
+    if len(parts) < FEWEST_PARTS:
+        return np.zeros(len(weights))
     # Each part left out in turn: the jackknife.
-    totals = found.sum(axis=0) - found
+    totals = parts.sum(axis=0) - parts
     each = np.array([_ratio(*_shares(one, weights)) for one in totals])
     error = np.sqrt((len(each) - 1) * each.var(axis=0))
-    mean = _ratio(*_shares(found.sum(axis=0), weights))
-    phi[kept] = np.where(mean > SIGNIFICANT * error, np.clip(mean, 0.0, LARGEST), 0.0)
-    return phi
+    phi = _ratio(*_shares(parts.sum(axis=0), weights))
+    return np.where(phi > SIGNIFICANT * error, np.clip(phi, 0.0, LARGEST), 0.0)
 
 
 def _ratio(variance: np.ndarray, covariance: np.ndarray) -> np.ndarray:

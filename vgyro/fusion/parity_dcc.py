@@ -20,6 +20,8 @@ from vgyro.fusion.parity_memory import TIME_CONSTANTS_S, LowPass
 BURN_IN = 16
 """Blocks that a mean must know before it is a forecast."""
 FEWEST_BLOCKS = 100
+MOST_BLOCKS = 1 << 18
+"""No more are compared: the first three days of them at 1 Hz."""
 SIGNIFICANT = 2.0
 
 
@@ -99,8 +101,8 @@ def _block_means(
     block = deviations.block
     edge = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1])
     number = block[edge]
-    inside = number >= 0
-    if inside.sum() < FEWEST_BLOCKS:
+    inside = np.flatnonzero(number >= 0)[:MOST_BLOCKS]
+    if len(inside) < FEWEST_BLOCKS:
         return None
     size = np.diff(np.append(edge, len(block)))[inside]
     sums = np.column_stack([np.add.reduceat(column, edge, dtype=float)[inside] for column in array.rate.T])
