@@ -10,6 +10,7 @@ import numpy as np
 from vgyro.report.arch import verdicts
 from vgyro.report.best import motion_sentences, rest_sentences
 from vgyro.report.crosscheck import failures
+from vgyro.report.faults import fault_sentences, faulty_gyros
 from vgyro.report.fits import NO_USE
 from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, rows_of
 from vgyro.report.noise import OVERLAPPING
@@ -45,7 +46,7 @@ class BadGyro:
 
 def conclude(dataset: DatasetPart) -> list[Conclusion]:
     """All sentences, the most important first."""
-    found = _gyro_sentences(dataset)
+    found = _gyro_sentences(dataset) + fault_sentences(dataset)
     for array in main_arrays(dataset):
         found += rest_sentences(dataset, array)
     found += motion_sentences(dataset)
@@ -130,7 +131,7 @@ def _gyro_sentences(dataset: DatasetPart) -> list[Conclusion]:
             verb = "is" if len(mine) == 1 else "are"
             text = f"Axis {axis}: {len(mine)} of {len(members)} gyros {verb} bad, × the median of the array: {listed}."
             found.append(Conclusion(text, "bad", f"{mine[0].recording}-{axis}"))
-        elif set(members) <= tested:
+        elif set(members) <= tested and not faulty_gyros(dataset).intersection(members):
             found.append(Conclusion(f"Axis {axis}: all {len(members)} gyros are healthy.", "good", f"axis-{axis}"))
     return found
 

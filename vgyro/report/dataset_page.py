@@ -11,6 +11,7 @@ from vgyro.report.best import BEST_RULES, Best, best_of_all
 from vgyro.report.conclusions import BAD_RULE, bad_gyros, conclude, main_arrays
 from vgyro.report.conventions import conventions_part, provenance_part
 from vgyro.report.crosscheck import crosscheck_part
+from vgyro.report.faults import FAULT_RULE, faults_part
 from vgyro.report.html import bullets, details, heading, join, macro, paragraph
 from vgyro.report.methods import dynamic_table, response_table, rest_tables
 from vgyro.report.model import ArrayPart, DatasetPart
@@ -48,7 +49,7 @@ def render_dataset(dataset: DatasetPart) -> str:
 def _conclusions(found: list[Conclusion]) -> Markup:
     if not found:
         return paragraph("Nothing can be concluded: no recording could be analysed.", "bad")
-    rules = details("Rules behind these sentences", bullets([BAD_RULE, *BEST_RULES, MOVED_RULE, ARCH_RULE]))
+    rules = details("Rules behind these sentences", bullets([BAD_RULE, FAULT_RULE, *BEST_RULES, MOVED_RULE, ARCH_RULE]))
     return join(macro("conclusions", found=tuple(found)), rules)
 
 
@@ -70,6 +71,7 @@ def _child(dataset: DatasetPart, array: ArrayPart, opened: bool) -> Section:
     html = join(
         rates_plots(recording, array),
         temperature_plot(recording) if first else "",
+        faults_part(dataset, array),
         heading("Correlation", 4),
         correlation_table(recording, array),
         cross_allan_plot(array),

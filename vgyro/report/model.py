@@ -121,8 +121,8 @@ class ArrayPart:
     """One array in one recording.
 
     gyros      : names, in the board's order
-    tables     : correlation, allan, cross_allan, spectrum, tones, metrics, methods, effects, crosscheck, more_gyros:
-                 columns as arrays; absent ones are missing
+    tables     : correlation, allan, cross_allan, spectrum, tones, metrics, methods, effects, faults, crosscheck,
+                 more_gyros: columns as arrays; absent ones are missing
     volatility : definition → its part
     kind       : kind of the recording
     """

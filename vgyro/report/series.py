@@ -6,6 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from vgyro.report.envelope import broken
+from vgyro.report.faults import fault_times
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import ArrayPart, RecordingPart, Table, rows_of
 from vgyro.report.numbers import duration, rounded
@@ -32,8 +33,9 @@ def rates_plots(recording: RecordingPart, array: ArrayPart) -> Markup:
     curves = _rate_curves(rates.time, rates.gyros, array)
     if rates.reference is not None:
         curves.append(Curve(REFERENCE, REFERENCE, rates.time, rates.reference, ink=True, width=1))
-    spans = rates.spans
-    whole = curve_plot(f"rates-{array.anchor}", title, curves, TIME, RATE, summary=summary, spans=spans)
+    spans, faults = rates.spans, fault_times(array)
+    summary += "; dashed: begin and end of faults" if faults else ""
+    whole = curve_plot(f"rates-{array.anchor}", title, curves, TIME, RATE, summary=summary, spans=spans, lines=faults)
     if not spans:
         return whole
     still = _rate_curves(rates.time, rates.rest, array)

@@ -316,6 +316,7 @@ def artefacts_of(wildcards):
                 "correlation",
                 "cross_allan",
                 "tones",
+                "faults",
                 "fused",
                 "methods",
                 "crosscheck",

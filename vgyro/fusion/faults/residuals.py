@@ -126,14 +126,14 @@ def _filled(rate: np.ndarray, weight: np.ndarray, spoilt: Sequence[Spoilt]) -> n
 
 
 def _good_share(bad: np.ndarray, weight: np.ndarray, gyro: int, spans: Sequence[Span]) -> np.ndarray:
-    """Weights [N] of the others that are good all over the first of the spans where there are any; else of all others."""
+    """Weights [N] of the others that are good all over a span, the first that has such; else of all others."""
+    others = np.arange(bad.shape[1]) != gyro
     for first, last in spans:
-        good = ~bad[first:last].any(axis=0)
-        good[gyro] = False
+        good = others & ~np.any(bad[first:last], axis=0)
         if good.any():
             break
     else:
-        good = np.arange(bad.shape[1]) != gyro
+        good = others
     share = np.where(good, weight, 0.0)
     return share / share.sum()
 
