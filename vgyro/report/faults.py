@@ -20,8 +20,8 @@ MOST_ROWS = 100
 FAULT_RULE = (
     "A gyro fails where it leaves the combination of the other gyros of its array by more than healthy gyros of this "
     "recording do, by as many standard deviations as analysis.faults.threshold says; the strongest event is taken "
-    "first and that gyro left out there, so that it accuses no other. What is wrong all the time is no event: see the rule "
-    f"for bad gyros. Red: to the end of the recording, or more than {LONG_SHARE:.0%} of it."
+    "first, and that gyro left out there, so that it accuses no other. What is wrong all the time is no event: see the "
+    f"rule for bad gyros. Red: to the end of the recording, or more than {LONG_SHARE:.0%} of it."
 )
 
 
