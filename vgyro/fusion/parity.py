@@ -111,7 +111,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     pairs = (~moments.excluded).sum(axis=1) > 1
     if pairs.sum() < FEWEST_BLOCKS:
         raise CannotRun(f"fewer than {FEWEST_BLOCKS} blocks with two good gyros", remedy="a longer recording is needed")
-    correlation = known_correlation(array, parameters)
+    correlation = _correlation(array, parameters)
     constant, outlier = constant_variances(moments, correlation)
     variance = np.broadcast_to(constant, moments.excluded.shape)
     tau, changes = np.full(gyros, math.inf), np.zeros(gyros, dtype=np.int64)
@@ -127,7 +127,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     )  # fmt: skip
 
 
-def known_correlation(array: ArrayRates, parameters: FilterParameters) -> np.ndarray:
+def _correlation(array: ArrayRates, parameters: FilterParameters) -> np.ndarray:
     """That of the noise, where the recording is at rest and it was measured; else none."""
     measured = array.noise.correlation
     if parameters.in_motion or not np.isfinite(measured).all():

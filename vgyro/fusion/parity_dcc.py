@@ -11,7 +11,7 @@ from vgyro import engine as engines
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.events import FaultEvent
-from vgyro.fusion.parity import Variances, known_correlation
+from vgyro.fusion.parity import Variances
 from vgyro.fusion.parity_blocks import block_moments
 from vgyro.fusion.parity_changing import changing_variances, residual_means
 from vgyro.fusion.parity_hat import constant_variances, parity_deviance
@@ -51,8 +51,9 @@ def prefer_dcc(
     Both forecast the variances of the block means that DCC was made for. Judged is the likelihood of the differences
     between the gyros, less their slow part, at these variances: it knows no motion, and the true variances have the
     best on average, whatever was used to find the slow part (Patton 2011, J. Econometrics 160, 246-256). The forecast
-    of EWMA for a block is the mean of the blocks before, with the gyro's time constant of `variances`; where that is
-    of change points alone, with the best one. Standard error of the mean difference: Newey & West (1987), lag ∛M.
+    of EWMA for a block is the mean of the squares of the blocks before, with the time constant that is best for the
+    gyro at these blocks. Standard error of the mean difference: Newey & West (1987), lag ∛M.
+    variances : of the same array; their correlation is used
     """
     deviations = array.deviations.get((model, mode, definition))
     if deviations is None:
@@ -62,19 +63,13 @@ def prefer_dcc(
         return _nothing(f"fewer than {FEWEST_BLOCKS} blocks")
     means, forecast = blocks
     moments = block_moments(means, 1)
-    correlation = known_correlation(means, parameters)
+    correlation = variances.correlation
     constant, outlier = constant_variances(moments, correlation)
     block_s = 1.0 / means.rate_hz
     found = changing_variances(moments, constant, outlier, correlation, block_s, parameters.engine)
     low_pass = engines.get(parameters.engine).kalman.low_pass
-    ewma = np.column_stack(
-        [
-            _causal(square, freedom, block_s, tau, changes, low_pass)
-            for square, freedom, tau, changes in zip(
-                found.square.T, found.freedom.T, variances.tau_s.tolist(), variances.changes.tolist(), strict=True
-            )
-        ]
-    )
+    columns = zip(found.square.T, found.freedom.T, strict=True)
+    ewma = np.column_stack([_causal(*one, block_s, low_pass) for one in columns])
     used = found.freedom > 0
     residual = residual_means(moments, found.variance, used, correlation)
     missing = ~used & ~moments.excluded
@@ -122,13 +117,10 @@ def _in_blocks(fault: FaultEvent, edge: np.ndarray) -> FaultEvent:
     return replace(fault, start=first, stop=int(np.searchsorted(edge, fault.stop, side="left")))
 
 
-def _causal(
-    square: np.ndarray, freedom: np.ndarray, block_s: float, tau: float, changes: int, low_pass: LowPass
-) -> np.ndarray:
-    """Mean [M] of the earlier squares with the time constant `tau`, or the best one where only the points change it."""
-    if not (changes and math.isinf(tau)):
-        return _mean_before(square, freedom, math.exp(-block_s / tau), low_pass)
-    tried = [_mean_before(square, freedom, math.exp(-block_s / one), low_pass) for one in TIME_CONSTANTS_S]
+def _causal(square: np.ndarray, freedom: np.ndarray, block_s: float, low_pass: LowPass) -> np.ndarray:
+    """Mean [M] of the earlier squares [M], with the time constant that forecasts best."""
+    times = [one for one in TIME_CONSTANTS_S if one >= block_s]
+    tried = [_mean_before(square, freedom, math.exp(-block_s / one), low_pass) for one in (*times, math.inf)]
     used = freedom > 0
     return min(tried, key=lambda one: float(np.nansum(_loss(square, one)[used])))
 
