@@ -1,7 +1,7 @@
 """Tables of the evidence on twins, in Markdown: python tests/fusion/twins/study.py [seeds] [part ...] > study.md
 
-Every row of the registry on the faulty array (in motion and at rest), on the twins of Liu et al. (2015) and Jiang et al.
-(2012), and held-out halves of a real array. Ratios are geometric means over the seeds, with 95 % intervals.
+Every row of the registry on the faulty array (in motion and at rest), on the twins of Liu et al. (2015) and of Jiang et
+al. (2012), and held-out halves of a real array. Ratios are geometric means over the seeds, with 95 % intervals.
 """
 
 from __future__ import annotations
@@ -72,9 +72,7 @@ def liu(seeds: range) -> str:
                 values = [f"{np.mean(found[name][figure]):.4g}" for figure in table3.LIU]
                 rows.append([f"{rate:g}", anchors, name, *values])
     head = ["rate", "anchors", "row", *table3.LIU]
-    parts.append(
-        f"### Liu twin, a minute of declared rest every ten minutes, {len(seeds)} seeds\n\n{table(head, rows)}"
-    )
+    parts.append(f"### Liu twin, a minute of rest every ten minutes, {len(seeds)} seeds\n\n{table(head, rows)}")
     return "\n".join(parts)
 
 

@@ -95,8 +95,8 @@ def held_out(folder: Path, axis: str, captures: Sequence[str]) -> dict[str, tupl
 def holds(found: dict[str, tuple[float, float]], axis: str) -> None:
     """Ours <= inverse variance <= average at the sample rate, but for one pair.
 
-    On y the gyro of IMU 7 is bad at the sample rate and not at 1 s (tests/metrics/test_real_recordings.py). ARW does not
-    see that, so that weights from it are no better than equal ones.
+    On y the gyro of IMU 7 is bad at the sample rate and not at 1 s (tests/metrics/test_real_recordings.py). ARW does
+    not see that, so that weights from it are no better than equal ones.
     """
     ours, inverse, average = (found[name][0] for name in ("ours", "inverse", "average"))
     assert ours <= inverse
