@@ -10,22 +10,6 @@ from vgyro.fusion.array import ArrayRates, FilterParameters, Fused
 from vgyro.fusion.blocks import combined
 from vgyro.fusion.parity import Variances, parity_variances
 
-SOURCE_PARITY = "differences between the gyros (N-cornered hat, Gray & Allan 1974), greatest likelihood"
-SOURCE_RESIDUAL = "residuals of the array, two-sided EWMA or change points by predictive likelihood"
-SAME_AT_ANY_RATE = {"": "Σw = 1, and a rate common to all gyros is in no difference between them"}
-BLOCK_OPERATIONS, BLOCK_SAMPLES = 1500, 50
-"""Operations a gyro and block of the choice of time constants, all passes, and samples of a block at 200 Hz."""
-
-
-def parity_operations(gyros: int) -> float:
-    """Operations a sample: second moments of the differences, steps, weighted sum."""
-    return gyros * (gyros + 9.0)
-
-
-def residual_operations(gyros: int) -> float:
-    """The same, and the work on blocks of 50 samples."""
-    return parity_operations(gyros) + BLOCK_OPERATIONS * gyros / BLOCK_SAMPLES
-
 
 def parity_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """Fixed minimum-variance weights from the constant variances of the parity space.
