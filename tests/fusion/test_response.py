@@ -12,6 +12,8 @@ from vgyro.fusion import METHODS, FilterParameters, Fused, SampleWeights, measur
 
 SAMPLES, RATE_HZ = 140_000, 200.0
 FILTERS = ("jiang_markov", "jiang_random_walk", "xue_2012", "chang_2012")
+SMOOTHERS = [name for name in METHODS if name.endswith("_smoothed")] + ["recommended"]
+ADAPTIVE = ("bayard_ploen", "chang_2008", "stubberud_2008", "al_majed")  # see their own tests
 MOMENTS = ("rolling_moment", "ewma_causal", "ewma_two_sided")
 NARROW = FilterParameters(bandwidth_hz=1.05)
 WIDE = FilterParameters(bandwidth_hz=5.0, tau_s=0.05)  # the Markov filter's DC gain is 0.36
@@ -31,7 +33,10 @@ def array(make_array):
     return make_array(SAMPLES, [0.1, 0.1, 0.12, 0.3], correlation=correlation, weights=weights)
 
 
-@pytest.mark.parametrize("name", [name for name in METHODS if name not in (*FILTERS, *MOMENTS)])
+DECLARED = [name for name in METHODS if name not in (*FILTERS, *MOMENTS, *SMOOTHERS, *ADAPTIVE)]
+
+
+@pytest.mark.parametrize("name", DECLARED)
 def test_weights_of_sum_one_pass_a_motion_as_it_is(array, name):
     # Rounding of differences of rates of some deg/s leaves 1e-12 of a motion of 0.2 deg/s.
     parameters = replace(NARROW, definition="level")
@@ -43,6 +48,27 @@ def test_weights_of_sum_one_pass_a_motion_as_it_is(array, name):
     for figures in (found, declared):
         assert math.isnan(figures.bandwidth_hz)
         assert math.isnan(figures.noise_bandwidth_hz)
+
+
+@pytest.mark.parametrize("name", SMOOTHERS)
+def test_smoothers_at_rest_have_the_response_they_declare(array, name):
+    # Closed form: first-order low-pass of pole a forward and back, |1/(1 + i·f/a)|² brought to samples; -3 dB of both
+    # passes together at the bandwidth asked for; no delay.
+    deviations = {key: SampleWeights.of(np.full((700, 4), 0.1), one.block) for key, one in array.weights.items()}
+    residual = {("dcc", "in_sample", "residual"): array.weights["dcc", "in_sample", "level"]}
+    known = dict.fromkeys(residual, deviations["dcc", "in_sample", "level"])
+    array = replace(array, weights=residual, deviations=known)
+    declared = METHODS[name].fuse(array, NARROW)
+    found = measured_response(METHODS[name].fuse, array, NARROW)
+    assert declared.passes == 2
+    assert declared.bandwidth_hz == pytest.approx(NARROW.bandwidth_hz, rel=1e-3)
+    assert found.bandwidth_hz == pytest.approx(declared.bandwidth_hz, rel=3e-3)
+    assert found.noise_bandwidth_hz == pytest.approx(declared.noise_bandwidth_hz, rel=3e-3)
+    assert found.dc_gain == pytest.approx(1.0, abs=1e-9)
+    assert found.delay_s == pytest.approx(0.0, abs=1e-6)
+    pole = declared.bandwidth_hz / math.sqrt(math.sqrt(2) - 1)
+    slow = found.frequency < 5
+    np.testing.assert_allclose(found.gain[slow], 1 / (1 + (found.frequency[slow] / pole) ** 2), atol=2e-3)
 
 
 @pytest.mark.parametrize("name", MOMENTS)

@@ -96,8 +96,9 @@ def analysed(tmp_path_factory):
 
 def test_every_method_has_its_row_and_column(analysed):
     fused, methods = fuse_in(analysed, [f"{name}/weights.parquet" for name in DEFINITIONS])
-    assert len(methods["method"]) == 11 + 4 * 2
-    assert set(fused) == {"time", "segment", *(column for column in methods["column"] if column)}
+    # Once each, but CCC and DCC in both modes for each definition.
+    assert len(methods["method"]) == len(METHODS) + 4
+    assert set(fused) == {"time", "segment", "sd_recommended", *(column for column in methods["column"] if column)}
     assert all(np.isfinite(values).all() for values in fused.values())
     row = dict(zip(methods["method"], methods["column"], strict=True))
     assert row["inverse_variance_rrw"] == ""
@@ -183,7 +184,7 @@ def test_moved_is_another_recording_that_turns(analysed, tmp_path):
         np.testing.assert_allclose(moved[name], expected[name] - INJECTED, atol=1e-4, err_msg=name)
     said = dict(zip(methods["column"], methods["moved"], strict=True))
     for column in fused:
-        if column in ("time", "segment", *answering):
+        if column in ("time", "segment", "sd_recommended", *answering):
             continue
         assert said[column].startswith("the same at any constant rate: "), column
         # What is said to be the same is the same in the recording that turns.
@@ -246,10 +247,16 @@ def test_a_response_that_is_not_declared_is_measured(analysed, monkeypatch):
 
 def test_both_engines_fuse_alike(analysed):
     tables = [f"{name}/weights.parquet" for name in DEFINITIONS]
-    native, reference = (fuse_in(analysed, tables, analysis={**ANALYSIS, "engine": name})[0] for name in ENGINES)
+    # The bank's response would be measured, by filterpy in minutes: tests/engine/native/test_adaptive.py compares it.
+    some = {"fusion": {"methods": [name for name in METHODS if name != "al_majed"]}}
+    native, reference = (
+        fuse_in(analysed, tables, analysis={**ANALYSIS, **some, "engine": name})[0] for name in ENGINES
+    )
     assert set(native) == set(reference)
     for name, column in native.items():
-        np.testing.assert_allclose(column, reference[name], rtol=1e-10, atol=1e-12, err_msg=name)
+        # Of the GARCH models of waegli_guerrier the two engines find the maximum to some 1e-6.
+        found = name == "waegli_guerrier"
+        np.testing.assert_allclose(column, reference[name], rtol=1e-10, atol=1e-5 if found else 1e-12, err_msg=name)
 
 
 def test_same_bytes_for_any_threads_and_instruction_set(analysed, tmp_path):
