@@ -42,6 +42,11 @@ def low_pass_of(fused: Fused) -> LowPass:
     return LowPass(limit, 1.0 if math.isnan(fused.dc_gain) else fused.dc_gain, fused.passes)
 
 
+def comparable(fused: Fused) -> bool:
+    """Is its band full, or limited by a first-order low-pass that is known?"""
+    return math.isfinite(fused.dc_gain) and not low_pass_of(fused).other_shape
+
+
 def jiang_static(one: Case, fused: Fused, bandwidth_hz: float) -> dict[str, float]:
     """1σ at the common bandwidth (deg/s), ARW read at 1 s (deg/√h) and bias drift (deg/h) of the rate as it is."""
     curve = allan_deviation(fused.rate, one.array.rate_hz)

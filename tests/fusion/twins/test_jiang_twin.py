@@ -22,8 +22,9 @@ Figures = dict[str, dict[str, list[float]]]
 
 
 def others(found: Figures) -> list[str]:
-    """Rows of the papers and baselines."""
-    return [name for name in found if METHODS[name.split("[")[0]].family != "ours"]
+    """Rows of the papers and baselines; the average and the median behind our smoother are parts of ours."""
+    rows = [name for name in found if METHODS[name.split("[")[0]].family != "ours"]
+    return [name for name in rows if not name.endswith("_smoothed")]
 
 
 def dynamic(recording, seeds, names=None, twin=None) -> Figures:
@@ -43,12 +44,12 @@ def moving() -> dict[str, Figures]:
 
 
 def at_rest(seeds) -> Figures:
-    """The hour at rest; a smoother of another shape has no equal bandwidth."""
+    """The hour at rest; what limits the band in a way of its own has no equal bandwidth."""
     found: Figures = defaultdict(lambda: defaultdict(list))
     for seed in seeds:
         one = case(load("jiang2012"), "static", seed, volatility=NO_DCC)
         for column, fused in run(one).fused.items():
-            if table3.low_pass_of(fused).other_shape:
+            if not table3.comparable(fused):
                 continue
             for figure, value in table3.jiang_static(one, fused, BANDWIDTH).items():
                 found[column][figure].append(value)
