@@ -198,14 +198,18 @@ def test_outliers_are_single():
 
 
 @pytest.mark.parametrize(("samples", "rate_hz"), RATES)
-def test_measured_correlation_at_rest(samples, rate_hz):
-    # Expected: at rest the simulated variances; in motion only their part that is not common, 1 - ρ of it.
+def test_measured_correlation(samples, rate_hz):
+    # Expected: with the correlation of the noise record the simulated variances, in motion too; without it only their
+    # part that is not common, 1 - ρ of it.
     rho, sigma = 0.4, np.full(6, 1.5)
     correlation = np.full((6, 6), rho) + (1 - rho) * np.eye(6)
     array = simulated(samples, rate_hz, sigma, seed=2, correlation=correlation)
-    for parameters, share in ((FilterParameters(), 1.0), (MOVING, 1.0 - rho)):
+    unknown = replace(array, noise=replace(array.noise, correlation=np.eye(6)))
+    for one, parameters, share in (
+        (array, FilterParameters(), 1.0), (array, MOVING, 1.0), (unknown, MOVING, 1.0 - rho),
+    ):  # fmt: skip
         expected = share * sigma**2
-        found = parity_variances(array, parameters, changing=False).variance[0]
+        found = parity_variances(one, parameters, changing=False).variance[0]
         assert (np.abs(found - expected) <= 4 * standard_errors(expected, samples)).all()
 
 

@@ -1,8 +1,8 @@
 """Parity: the noise of each gyro from the differences between them, at rest and in any motion.
 
 What the gyros have in common, motion or noise, is in no difference. So in motion only the part of the noise can be
-known that is not common to all of them, and their correlation is taken as none; where the whole recording is at rest
-the correlation that was measured there is used.
+known that is not common to all of them. Their correlation is that of the noise record, which was measured at rest, in
+this recording or another one of the array; none where there is no such record.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     pairs = (~moments.excluded).sum(axis=1) > 1
     if pairs.sum() < FEWEST_BLOCKS:
         raise CannotRun(f"fewer than {FEWEST_BLOCKS} blocks with two good gyros", remedy="a longer recording is needed")
-    correlation = _correlation(array, parameters)
+    correlation = _correlation(array)
     constant, outlier = constant_variances(moments, correlation)
     variance = np.broadcast_to(constant, moments.excluded.shape)
     tau, changes = np.full(gyros, math.inf), np.zeros(gyros, dtype=np.int64)
@@ -127,10 +127,10 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     )  # fmt: skip
 
 
-def _correlation(array: ArrayRates, parameters: FilterParameters) -> np.ndarray:
-    """That of the noise, where the recording is at rest and it was measured; else none."""
+def _correlation(array: ArrayRates) -> np.ndarray:
+    """That of the noise record, where it was measured; else none."""
     measured = array.noise.correlation
-    if parameters.in_motion or not np.isfinite(measured).all():
+    if not np.isfinite(measured).all():
         return np.eye(len(measured))
     return measured if np.linalg.eigvalsh(measured)[0] >= SMALLEST_EIGENVALUE else np.eye(len(measured))
 

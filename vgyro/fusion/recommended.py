@@ -8,6 +8,7 @@
    likelihood supports it, anchors where the board is declared to stand still between motion.
 4. u = minimum-variance weights of R_t;  z = u'(y - b).
 5. The motion: model and parameters by likelihood, two-sided smoother of z with u'R_t·u (vgyro.fusion.smoother).
+6. The sensor's low-pass, where parity shows its colour in the noise, is undone on the smoothed rate.
 
 The posterior variance of a sample is that of 5 plus that of u'(b - its estimate) of 3.
 """
@@ -46,8 +47,10 @@ def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
         known.variances.colour(),
         weights,
         known.note,
+        known.slow.at_samples(slow_variance(weights, known.slow)),
+        undo_pole=True,
     )
-    return smoothed(array, parameters, signal, known.slow.at_samples(slow_variance(weights, known.slow)))
+    return smoothed(array, parameters, signal)
 
 
 def recommended_unsmoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:

@@ -22,6 +22,8 @@ from vgyro.fusion.parity import Variances, parity_variances
 from vgyro.fusion.smoother import Smoothed, choose_motion, fixed_bandwidth, smooth
 
 DCC = ("dcc", "in_sample", "residual")
+SLOW_BESIDE_POLE = 0.5
+"""The sensor's pole is undone where the smoother's bandwidth is below this share of the pole's frequency."""
 REST_NOTE = "at rest as a whole: a fixed bandwidth, forward and back"
 
 
@@ -32,6 +34,8 @@ class Signal:
     rate     : [T], deg/s;  variance : of its white noise, (deg/s)² a sample, one number or [T]
     colour   : correlation of that noise from one sample to the next
     weights  : as in Fused;  note : what to know of them
+    slow_variance : [T] of its slow error, (deg/s)², which no smoothing takes away; None: not known
+    undo_pole : take the low-pass of the sensor, which colours its noise, off the smoothed rate
     """
 
     rate: np.ndarray
@@ -39,6 +43,8 @@ class Signal:
     colour: float
     weights: np.ndarray | SampleWeights | None
     note: str
+    slow_variance: np.ndarray | None = None
+    undo_pole: bool = False
 
 
 def shared_variances(array: ArrayRates, parameters: FilterParameters, changing: bool) -> Variances:
@@ -114,13 +120,8 @@ def _of_blocks(weights: SampleWeights, deviations: SampleWeights, length: int) -
     return variance
 
 
-def smoothed(
-    array: ArrayRates, parameters: FilterParameters, signal: Signal, slow_variance: np.ndarray | None = None
-) -> Fused:
-    """Smooth a fused rate. slow_variance [T] : of its slow error, (deg/s)², which no smoothing takes away.
-
-    raises : CannotRun where no model of the motion can be fitted
-    """
+def smoothed(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Fused:
+    """Smooth a fused rate.  raises : CannotRun where no model of the motion can be fitted"""
     try:
         if parameters.in_motion:
             result = _in_motion(array, parameters, signal)
@@ -129,20 +130,47 @@ def smoothed(
             result, variance = _at_rest(array, parameters, signal)
     except DataError as reason:
         raise CannotRun(reason.what, reason.where, reason.remedy) from None
-    if slow_variance is not None:
-        variance = variance + slow_variance
+    slow, sd = signal.slow_variance, None
+    if slow is not None:
+        sd = np.sqrt(variance + slow, dtype=np.float32)
     notes = [result.parameters, REST_NOTE if not parameters.in_motion else "", signal.note]
+    rate, lead_s = result.rate, 0.0
+    if signal.undo_pole and parameters.in_motion and signal.colour > 0:
+        lead_s = pole_time(signal.colour, array.period)
+        if result.bandwidth_hz < SLOW_BESIDE_POLE / (2.0 * math.pi * lead_s):
+            rate = without_pole(array, rate, lead_s)
+            notes.append(f"the sensor's pole at {1.0 / (2.0 * math.pi * lead_s):.3g} Hz is undone")
+        else:
+            lead_s = 0.0
     return Fused(
-        result.rate,
+        rate,
         signal.weights,
         dc_gain=1.0,
         bandwidth_hz=result.bandwidth_hz,
         noise_bandwidth_hz=result.noise_bandwidth_hz,
-        delay_s=0.0,
+        delay_s=-lead_s,
         note="; ".join(note for note in notes if note),
         passes=result.passes,
-        sd=np.sqrt(variance, dtype=np.float32) if slow_variance is not None else None,
+        sd=sd,
     )
+
+
+def pole_time(colour: float, period: float) -> float:
+    """Time constant, s, of the first-order low-pass that makes white noise correlate by `colour` from one sample to
+    the next: -T/ln φ."""
+    return -period / math.log(colour)
+
+
+def without_pole(array: ArrayRates, rate: np.ndarray, time_s: float) -> np.ndarray:
+    """The rate [T] before a first-order low-pass of time constant `time_s`: rate + time_s·d(rate)/dt.
+
+    The derivative is that of the parabola through three samples; of a rate far below the pole's frequency.
+    """
+    undone = rate.copy()
+    for part in array.stretches():
+        if part.stop - part.start > 2:
+            undone[part] += time_s * np.gradient(rate[part], array.period, edge_order=2)
+    return undone
 
 
 def _in_motion(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Smoothed:
