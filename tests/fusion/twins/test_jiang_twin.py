@@ -27,11 +27,11 @@ def others(found: Figures) -> list[str]:
     return [name for name in rows if not name.endswith("_smoothed")]
 
 
-def dynamic(recording, seeds, names=None, twin=None) -> Figures:
+def dynamic(recording, seeds, names=None, twin=None, **parameters) -> Figures:
     found: Figures = defaultdict(lambda: defaultdict(list))
     twin = twin or load("jiang2012")
     for seed in seeds:
-        one = case(twin, recording, seed, volatility=NO_DCC)
+        one = case(twin, recording, seed, volatility=NO_DCC, **parameters)
         for column, fused in run(one, names).fused.items():
             for figure, value in table3.jiang_dynamic(one, fused).items():
                 found[column][figure].append(value)
@@ -156,10 +156,14 @@ def test_what_the_dynamic_table_follows_from():
         assert np.mean(constant) == pytest.approx(0.167, abs=0.005)
 
 
-@pytest.mark.parametrize("recording", TESTS)
-def test_one_minute_of_each_motion(recording):
+@pytest.mark.parametrize(
+    ("recording", "model"), [("constant", "random_walk"), ("random", "jerk"), ("sinusoid", "oscillator")]
+)
+def test_one_minute_of_each_motion(recording, model):
+    # The model of the motion is given here, which is what takes time to choose.
     short = load("jiang2012", {"duration_s: 120": "duration_s: 60"})
-    found = dynamic(recording, [1], [OURS, "average", "median", "jiang_random_walk", "chang_2012"], short)
+    rows = [OURS, "average", "median", "jiang_random_walk", "chang_2012"]
+    found = dynamic(recording, [1], rows, short, motion_models=(model,))
     for name in others(found):
         assert found[OURS]["sigma"][0] < found[name]["sigma"][0], name
     if recording != "constant":
