@@ -55,7 +55,7 @@ def board_of(twin: Twin) -> Board:
 class Case:
     """One recording of a twin: what the methods get, and the truth.
 
-    truth    : [T], deg/s, the rate behind the sensors' pole: the delay of a row is then its own
+    truth    : [T], deg/s;  seen : the same behind the sensors' pole, which comes 4 ms later at 40 Hz
     bias     : [T, N], deg/s, what is left of it after the calibration
     variance : [T, N], (deg/s)², of the white noise of each sample before the pole, faults in
     correlation : [N, N] of it;  faulty : [T, N]
@@ -64,6 +64,7 @@ class Case:
     array: ArrayRates
     parameters: FilterParameters
     truth: np.ndarray
+    seen: np.ndarray
     bias: np.ndarray
     variance: np.ndarray
     correlation: np.ndarray
@@ -134,6 +135,7 @@ def case(
     return Case(
         array,
         known,
+        simulated.reference + added,
         seen_rate(twin, simulated) + added,
         simulated.bias - offset,
         simulated.white_sd**2,

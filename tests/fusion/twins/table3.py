@@ -58,9 +58,13 @@ def jiang_static(one: Case, fused: Fused, bandwidth_hz: float) -> dict[str, floa
     }
 
 
-def jiang_dynamic(one: Case, fused: Fused) -> dict[str, float]:
-    """1σ of rate - truth, the same with the delay removed (deg/s), amplitude over the true one, delay (s)."""
-    found = dynamic_errors(fused.rate, one.truth, one.array.rate_hz, one.array.segment)
+def jiang_dynamic(one: Case, fused: Fused, seen: bool = False) -> dict[str, float]:
+    """1σ of rate - truth, the same with the delay removed (deg/s), amplitude over the true one, delay (s).
+
+    seen : against the rate behind the sensors' pole
+    """
+    truth = one.seen if seen else one.truth
+    found = dynamic_errors(fused.rate, truth, one.array.rate_hz, one.array.segment)
     return {
         "sigma": found.error_sigma,
         "aligned": found.error_sigma_aligned,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from dataclasses import replace
 
@@ -17,6 +18,8 @@ TESTS = ("constant", "random", "sinusoid")
 BANDWIDTH = 1.053
 """Hz, of the filters with the paper's q and the twin's ARW: docs/methods.md"""
 ALIKE = 1.01
+POLE_S = 1 / (2 * math.pi * 40)
+"""Delay of the sensor, s."""
 FILTERS = ("jiang_random_walk", "jiang_markov")
 Figures = dict[str, dict[str, list[float]]]
 
@@ -67,8 +70,8 @@ def test_lowest_deviation_in_motion(moving, recording):
     found = moving[recording]
     ratios = {name: ratio_of(found[OURS]["sigma"], found[name]["sigma"]) for name in others(found)}
     assert {name: str(one) for name, one in ratios.items() if one.high >= 1} == {}
-    # Rows of ours that are parts of it may be as good.
-    for name in set(found) - set(others(found)):
+    # Rows that are parts of it may be as good; of the median, a constant may be left without any deviation.
+    for name in set(found) - set(others(found)) - {"median_smoothed"}:
         assert ratio_of(found[OURS]["sigma"], found[name]["sigma"]).mean <= ALIKE, name
 
 
@@ -77,10 +80,10 @@ def test_amplitude_and_delay(moving):
     for recording in ("random", "sinusoid"):
         ours, average = (moving[recording][name] for name in (OURS, "average"))
         assert np.abs(np.array(ours["amplitude"]) - 1).max() <= 0.005
-        # The average has no delay: what is measured of it is chance. A twentieth of a sample; the filter is 29 ms late.
-        assert np.abs(np.array(ours["delay"]) - average["delay"]).max() <= 1e-4
+        # The average has no delay but the sensor's, 4.0 ms: what more is measured of it is chance. A tenth of a sample.
+        assert np.abs(np.array(ours["delay"]) - average["delay"] + POLE_S).max() <= 2e-4
     late = np.mean(moving["sinusoid"]["jiang_random_walk"]["delay"])
-    assert late == pytest.approx(0.029, abs=0.002)
+    assert late == pytest.approx(0.029 + POLE_S, abs=0.002)
 
 
 @pytest.mark.full
@@ -146,7 +149,7 @@ def test_what_the_dynamic_table_follows_from():
         constant = []
         for seed in SEEDS:
             one, fused = as_printed("sinusoid", seed, [name])
-            for figure, value in table3.jiang_dynamic(one, fused[name]).items():
+            for figure, value in table3.jiang_dynamic(one, fused[name], seen=True).items():
                 sine[figure].append(value)
             one, fused = as_printed("constant", seed, [name])
             constant.append(table3.jiang_dynamic(one, fused[name])["sigma"])
@@ -168,4 +171,4 @@ def test_one_minute_of_each_motion(recording, model):
         assert found[OURS]["sigma"][0] < found[name]["sigma"][0], name
     if recording != "constant":
         assert found[OURS]["amplitude"][0] == pytest.approx(1, abs=0.005)
-        assert abs(found[OURS]["delay"][0] - found["average"]["delay"][0]) < 1e-4
+        assert abs(found[OURS]["delay"][0] - found["average"]["delay"][0] + POLE_S) <= 2e-4
