@@ -52,7 +52,8 @@ def write_artefacts(folder, manifest):
     put("z/fused.parquet", {**about, **dict.fromkeys((*METHODS, "dcc_in_sample[level]"), mean)}, "fused")
     known = [(name, "", name) for name in METHODS] + [("dcc_in_sample", "level", "dcc_in_sample[level]")]
     methods = dict(zip(("method", "definition", "column"), zip(*known, strict=True), strict=True))
-    put("z/methods.parquet", {**methods, "bandwidth_hz": [np.nan] * 6, "dc_gain": [1.0] * 6}, "methods")
+    answers = {"bandwidth_hz": [np.nan] * 6, "dc_gain": [1.0] * 6, "passes": [1] * 6}
+    put("z/methods.parquet", {**methods, **answers}, "methods")
     put("z/metrics.parquet", metrics_table(manifest), "metrics")
     pairs = [(a, b) for a in GYROS for b in GYROS]
     put("z/correlation.parquet", {
