@@ -17,7 +17,7 @@ from vgyro.calibration import compensate, to_rates
 from vgyro.config import FaultOptions
 from vgyro.fusion import ArrayNoise, ArrayRates
 from vgyro.fusion.events import FaultEvent
-from vgyro.fusion.faults import ALL_KINDS, find_faults, limits_of, sentence
+from vgyro.fusion.faults import ALL_KINDS, search_faults, sentence
 from vgyro.storage.tables import read_json, read_metadata, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.convert import compensations_of
@@ -42,8 +42,9 @@ def main(task: Task) -> None:
     if options.detect == "auto":
         file = read_array(task.input("rates"), names, task.options["axis"])
         array = array_of(file)
-        note = limits_of(array, options)
-        events = find_faults(array, options, zero_counts(file.path, gyros, task.inputs.get("calibration", [])))
+        zero = zero_counts(file.path, gyros, task.inputs.get("calibration", []))
+        search = search_faults(array, options, zero)
+        note, events = search.note, search.events
         times = times_at(file.path, [sample for one in events for sample in (one.start, one.stop - 1)])
         ends = [one.stop == len(array.rate) for one in events]
         pairs = zip(events, times.reshape(-1, 2).tolist(), ends, strict=True)

@@ -10,6 +10,7 @@ from vgyro.fusion.array import ArrayRates
 
 FEWEST_SAMPLES = 8  # in a block, so that it has a variance
 PIECE = 1 << 15
+SILENT = 1e-10
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,13 @@ class BlockSums:
 
     def __len__(self) -> int:
         return len(self.count)
+
+
+def silent_share(sums: BlockSums) -> np.ndarray:
+    """Share of the blocks in which each gyro gives one value alone [N]."""
+    together = sums.moment[:, -1, -1, None] + 2.0 * sums.moment[:, :-1, -1]
+    own = together + np.diagonal(sums.moment, axis1=1, axis2=2)[:, :-1]
+    return np.mean(own <= SILENT * np.max(own, axis=0), axis=0)
 
 
 def block_length(rate_hz: float, block_s: float) -> int:

@@ -63,6 +63,19 @@ def usual_variance(sums: BlockSums) -> np.ndarray:
     return np.maximum(solved, LEAST_SHARE * np.median(seen))
 
 
+def common_ratio(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """Variance over usual variance of the gyro in the middle of the array [B]: whether most leave the others at once.
+
+    gain : [N] sensitivities. The variances of the gyros come from the residuals as in usual_variance, block by block.
+    """
+    gyros = sums.gyros
+    mix = np.where(np.eye(gyros, dtype=bool), 1.0, -1.0 / (gyros - 1))
+    parts = mix / gain
+    parts = np.column_stack([parts, parts.sum(axis=1)])
+    seen = np.einsum("ip,bpq,iq->bi", parts, sums.moment, parts, optimize=True)
+    return np.median(np.linalg.solve(mix**2, seen.T).T / sigma2, axis=1)
+
+
 def residuals_of(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray, spoilt: Sequence[Spoilt]) -> Residuals:
     """Residuals of every gyro against the inverse-variance combination of the others that are not spoilt.
 

@@ -8,8 +8,8 @@ from vgyro.fusion.faults.block_sums import BlockSums
 from vgyro.fusion.faults.candidate import Candidate, lengths_up_to, running_sum, spread
 from vgyro.fusion.faults.residuals import Residuals
 
-LEAST_CHANGE = 0.003
-"""Smaller changes of the sensitivity are what calibrations leave over."""
+LEAST_CHANGE = 0.005
+"""Smaller changes of the sensitivity are what calibration and mounting leave over, as axes are not quite parallel."""
 FEWEST_BLOCKS = 8
 FEWEST_WINDOWS = 16
 ROUNDS = 4
@@ -60,7 +60,8 @@ def suspect_scale(
 ) -> Candidate | None:
     """The window in which the slope differs most from the usual; None: in none.
 
-    counts : [B], false where something else is known to be wrong;  local : [B] variance of a sample of the residual
+    counts : [B], false where something else is known to be wrong
+    local  : [B] variance of a sample of the residual, of white noise that is as strong at the motion's frequencies
     The evidence is the slope over its standard error, from the noise or from how much it varies in health.
     """
     top, bottom = _parts(sums, found, gyro)

@@ -11,38 +11,54 @@ from vgyro.config import FaultOptions
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.events import FAULT_KINDS, FaultEvent, FaultKind
 from vgyro.fusion.faults.bias import suspect_bias
-from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums
+from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums, silent_share
 from vgyro.fusion.faults.candidate import Candidate
 from vgyro.fusion.faults.dead import find_dead
 from vgyro.fusion.faults.noise import noise_level, suspect_noise
-from vgyro.fusion.faults.residuals import Residuals, Spoilt, residuals_of, usual_variance
-from vgyro.fusion.faults.scale import slope_in, suspect_scale, usual_slope
+from vgyro.fusion.faults.residuals import Residuals, Spoilt, common_ratio, residuals_of, usual_variance
+from vgyro.fusion.faults.scale import LEAST_CHANGE, slope_in, suspect_scale, usual_slope
 from vgyro.fusion.faults.wander import bends_of, healthy_array, local_variance, slow_part
 
 FEWEST_GYROS = 3
 FEWEST_BLOCKS = 20
 LONGEST_GAP_S = 60.0
 MOST_ROUNDS = 100
+MOST_COMMON = 2.0
+"""Where the gyro in the middle of the array has more than this times its usual variance, no single one is judged."""
 NEAR = 8  # blocks: candidates nearer to each other than this are not taken in one round
 ONLY_DEAD = "only stuck and dropout were looked for"
 TOO_FEW = f"fewer than three gyros: a difference does not tell which of two is at fault; {ONLY_DEAD}"
 TOO_SHORT = f"less than {FEWEST_BLOCKS} blocks; {ONLY_DEAD}"
+MOST_SILENT = 0.02
+TOO_COARSE = f"the counts are too coarse for the noise: blocks hold one value alone; {ONLY_DEAD}"
 BIAS_KINDS = ("step", "drift")
 NOISE_KINDS = ("noise", "burst")
 
 
-def limits_of(array: ArrayRates, options: FaultOptions | None = None) -> str:
-    """What could not be looked for in this recording, and why; "" where all kinds could."""
+@dataclass(frozen=True)
+class Search:
+    """events : as of find_faults;  note : what could not be looked for in this recording, and why; "": nothing"""
+
+    events: list[FaultEvent]
+    note: str = ""
+
+
+def _limits(array: ArrayRates, options: FaultOptions) -> str:
     if array.rate.shape[1] < FEWEST_GYROS:
         return TOO_FEW
-    length = block_length(array.rate_hz, (options or FaultOptions()).block_s)
+    length = block_length(array.rate_hz, options.block_s)
     return TOO_SHORT if len(array.rate) < FEWEST_BLOCKS * length else ""
 
 
 def find_faults(
     array: ArrayRates, options: FaultOptions | None = None, zero: np.ndarray | None = None
 ) -> list[FaultEvent]:
-    """Stretches in which a gyro is at fault, in the order of their starts.
+    """Stretches in which a gyro is at fault, in the order of their starts: the events of search_faults."""
+    return search_faults(array, options, zero).events
+
+
+def search_faults(array: ArrayRates, options: FaultOptions | None = None, zero: np.ndarray | None = None) -> Search:
+    """Look for stretches in which a gyro is at fault.
 
     zero : [N, 2] deg/s, between which the rate of a count of zero lies (NaN: not known), to tell dropout from stuck
     Parity: each gyro against the inverse-variance combination of the others, so that the motion cancels. The strongest
@@ -53,15 +69,18 @@ def find_faults(
     """
     options = options or FaultOptions()
     dead = find_dead(array, zero)
-    if limits_of(array, options):
-        return dead
+    limits = _limits(array, options)
+    if limits:
+        return Search(dead, limits)
     gone = [[(one.start, one.stop) for one in dead if one.gyro == gyro] for gyro in range(array.rate.shape[1])]
     length = block_length(array.rate_hz, options.block_s)
     stretches = [np.array(spans, dtype=np.int64).reshape(-1, 2) for spans in gone]
     sums = block_sums(array, length, stretches, LONGEST_GAP_S)
+    if np.median(silent_share(sums)) > MOST_SILENT:
+        return Search(dead, TOO_COARSE)
     state = _State(sums, length * array.period, options, _spoilt_by(dead, sums))
     found = [_in_samples(one, sums) for one in _merged(state.search(), options.burst_s / state.block_s)]
-    return sorted([*dead, *found], key=lambda event: (event.start, event.gyro, event.kind))
+    return Search(sorted([*dead, *found], key=lambda event: (event.start, event.gyro, event.kind)))
 
 
 def _spoilt_by(dead: Sequence[FaultEvent], sums: BlockSums) -> list[Spoilt]:
@@ -82,9 +101,13 @@ class _State:
     dead: list[Spoilt]
     taken: list[Candidate] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self.judged, self.run = np.ones(len(self.sums), dtype=bool), self.sums.run
+
     def search(self) -> list[Candidate]:
         sigma2 = usual_variance(self.sums)
         gain = self._gain(sigma2)
+        self._judge(sigma2, gain)
         for _ in range(MOST_ROUNDS):
             found = residuals_of(self.sums, sigma2, gain, self._spoilt())
             accepted = list(_apart(self._suspects(found)))
@@ -93,7 +116,23 @@ class _State:
             self.taken += accepted
             if any(one.kind == "scale" for one in accepted):
                 gain = self._gain(sigma2)
-        return self.taken
+        return [one for one in self.taken if one.kind != "scale" or abs(one.size) >= LEAST_CHANGE]
+
+    def _judge(self, sigma2: np.ndarray, gain: np.ndarray) -> None:
+        """Leave out the blocks in motion in which most gyros leave the others at once: that is the array, not a gyro.
+
+        Gyros that are not parallel see different parts of a hard motion, and where the board comes to rest again their
+        biases may be others, as gravity has another direction. So a run ends there, too.
+        """
+        moving = residuals_of(self.sums, sigma2, gain, self.dead).moving
+        apart = moving & (common_ratio(self.sums, sigma2, np.median(gain, axis=0)) > MOST_COMMON)
+        self.judged = ~(apart | np.append(apart[1:], False) | np.append(False, apart[:-1]))
+        hard = apart & (np.append(apart[1:], False) | np.append(False, apart[:-1]))
+        begins = np.flatnonzero(np.diff(np.append(False, hard).astype(np.int8)) != 0)
+        run = self.sums.run.copy()
+        for place in begins:
+            run[place:] += 1
+        self.run = run
 
     def _gain(self, sigma2: np.ndarray) -> np.ndarray:
         """Sensitivity of each gyro relative to the others [B, N]: constant but for changes that were found.
@@ -122,7 +161,7 @@ class _State:
 
     def _counts(self, gyro: int, kinds: Sequence[str], edges: Sequence[str] = ()) -> np.ndarray:
         """Blocks [B] without a fault of these kinds of that gyro, and without an end of one of the kinds `edges`."""
-        counts = np.ones(len(self.sums), dtype=bool)
+        counts = self.judged.copy()
         for dead in self.dead:
             if dead.gyro == gyro:
                 counts[dead.first : dead.last] = False
@@ -136,18 +175,23 @@ class _State:
 
     def _suspects(self, found: Residuals) -> list[Candidate]:
         """The strongest suspicion of every gyro and kind."""
-        threshold, run = self.options.threshold, self.sums.run
+        threshold, run = self.options.threshold, self.run
         suspects: list[Candidate | None] = []
         counts = [self._counts(gyro, BIAS_KINDS) for gyro in range(self.sums.gyros)]
         healthy = [self._counts(gyro, FAULT_KINDS) for gyro in range(self.sums.gyros)]
         slow = [slow_part(found, gyro, counts[gyro], run) for gyro in range(self.sums.gyros)]
         bends = [bends_of(part, one) for part, one in zip(slow, healthy, strict=True)]
-        for gyro, part in enumerate(healthy_array(slow, bends)):
+        local = [local_variance(found, gyro) for gyro in range(self.sums.gyros)]
+        health = healthy_array(slow, bends)
+        # What the motion is compared with is slow: noise of that sort is stronger than samples show if it has a colour.
+        shares = [np.median(part.white * self.sums.count / one) for part, one in zip(health, local, strict=True)]
+        colour = max(1.0, float(np.median(shares)))
+        for gyro, part in enumerate(health):
             suspects.append(suspect_bias(part, gyro, self.block_s, threshold))
             level = noise_level(found, gyro, self._counts(gyro, NOISE_KINDS, (*BIAS_KINDS, "scale")))
             suspects.append(suspect_noise(level, gyro, self.block_s, self.options.burst_s, threshold))
             steady = self._counts(gyro, ("scale",), BIAS_KINDS)
-            suspects.append(suspect_scale(self.sums, found, gyro, steady, local_variance(found, gyro), threshold))
+            suspects.append(suspect_scale(self.sums, found, gyro, steady, colour * local[gyro], threshold))
         return [one for one in suspects if one is not None]
 
 

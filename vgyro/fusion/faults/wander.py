@@ -19,6 +19,10 @@ LOW_NOISE = 6.0
 FEWEST_WINDOWS = 4
 MEDIAN_NOISE = 1.25
 CLEAR = 3.0
+HIGH_SHARE = 0.8
+HIGH_SQUARE = 1.642
+"""The same of what the motion adds: hard motion adds more than its share."""
+LEAST_VARIANCE = 1e-3
 BEND_OF_FLICKER = 2.434
 CONTRAST_OF_BEND = 2.0 / 3.0
 ENOUGH_BLOCKS = 50
@@ -58,6 +62,8 @@ class Slow:
 def local_variance(found: Residuals, gyro: int) -> np.ndarray:
     """Variance of a sample of the residual in and around each block [B]: the greater one of the two, for bursts."""
     variance = np.where(np.isfinite(found.variance[:, gyro]), found.variance[:, gyro], found.expected[:, gyro])
+    # A gyro that gives one value alone has noise all the same: that of its converter.
+    variance = np.maximum(variance, LEAST_VARIANCE * found.expected[:, gyro])
     sums = running_sum(variance)
     blocks = np.arange(len(variance))
     low, high = np.maximum(blocks - NEARBY, 0), np.minimum(blocks + NEARBY + 1, len(variance))
@@ -88,7 +94,8 @@ def _white(mean: np.ndarray, found: Residuals, gyro: int, counts: np.ndarray) ->
     leak = 0.0
     if (both & moving).sum() >= ENOUGH_BLOCKS and not np.array_equal(quiet, both):
         excess = steps**2 - share * pair
-        leak = max(float(np.median((excess / (power[1:] + power[:-1]))[both & moving])), 0.0)
+        ratio = (excess / (power[1:] + power[:-1]))[both & moving]
+        leak = max(float(np.quantile(ratio, HIGH_SHARE)) / HIGH_SQUARE, 0.0)
     return share * local + leak * np.where(found.moving, power, 0.0)
 
 

@@ -1,0 +1,6 @@
+"""Tests of the fault search: fault_cases.py, beside this file, is no package."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
