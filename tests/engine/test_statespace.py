@@ -78,23 +78,6 @@ def test_against_the_joint_posterior(which, states, pole):
     assert count == 56
 
 
-@pytest.mark.parametrize("which", ENGINES)
-@pytest.mark.parametrize("pole", [0.0, 0.6])
-def test_leaving_one_out(which, pole):
-    # Expected: each sample predicted by the dense posterior of all others: log p(all) - log p(all but this one).
-    model = model_of(3, pole, regimes=2)
-    z, r, regime = measured()
-    told = np.flatnonzero(np.isfinite(r))
-    whole, expected = dense(z, r, model, regime)[0], 0.0
-    for left in told:
-        others = r.copy()
-        others[left] = np.inf
-        expected += whole - dense(z, others, model, regime)[0]
-    total, count = engine.get(which).statespace.leave_one_out(z, r, model, regime)
-    assert total == pytest.approx(expected, rel=1e-10)
-    assert count == len(told)
-
-
 def test_engines_agree_over_borders_of_chunks():
     # Expected: filterpy. The native smoother keeps its state every 1024 samples.
     model = model_of(3, 0.5, regimes=2)
@@ -103,8 +86,6 @@ def test_engines_agree_over_borders_of_chunks():
     ours, theirs = (engine.get(which).statespace.smooth(z, r, model, regime) for which in ENGINES)
     np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-9)
     totals = [engine.get(which).statespace.log_likelihood(z, r, model, 20, regime) for which in ENGINES]
-    assert totals[0] == (pytest.approx(totals[1][0], rel=1e-11), totals[1][1])
-    totals = [engine.get(which).statespace.leave_one_out(z, r, model, regime) for which in ENGINES]
     assert totals[0] == (pytest.approx(totals[1][0], rel=1e-11), totals[1][1])
 
 
@@ -185,7 +166,6 @@ def test_no_samples(which):
     module, model = engine.get(which).statespace, model_of(2)
     assert module.smooth(np.empty(0), 1.0, model)[1].shape == (0,)
     assert module.log_likelihood(np.empty(0), 1.0, model) == (0.0, 0)
-    assert module.leave_one_out(np.empty(0), 1.0, model) == (0.0, 0)
 
 
 HASH = """

@@ -1,6 +1,7 @@
 """The choice of a motion model by likelihood, on simulated rates whose truth is known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -131,18 +132,19 @@ def test_few_samples_at_1_hz():
 
 
 def test_a_long_recording_by_windows_and_block_means():
-    """Known truth: a random walk so slow that noise and rate are alike at 0.02 Hz, 100 times below what a window of
-    8192 samples resolves well. The mean of 4 fits is within 10 % of q, and the blocks make the difference."""
-    rate_hz, samples, q = 500.0, 400_000, 4.0 * (2 * math.pi * 0.02) ** 2 / 500.0
+    """Known truth: a random walk so slow that noise and rate are alike at 0.1 Hz, which a window of 4096 samples (8 s)
+    does not resolve. The mean of 4 fits is within 15 % of q: each has 1/√(800 s · ∫G² df) = 13 %, their mean 6 %."""
+    rate_hz, samples, q = 500.0, 400_000, 4.0 * (2 * math.pi * 0.1) ** 2 / 500.0
     found, evidence = [], None
     for seed in range(4):
         z = np.cumsum(white(seed, samples)) * math.sqrt(q / rate_hz) + 2.0 * white(seed + 50, samples)
-        found.append(choose_motion(z, 4.0, one_stretch(z), rate_hz, models=("random_walk",)).parameters["q"])
-        evidence = gather(z, np.array(4.0), one_stretch(z), rate_hz, 0.0, "native", None)
-    assert np.mean(found) == pytest.approx(q, rel=0.1)
+        motion = choose_motion(z, 4.0, one_stretch(z), rate_hz, models=("random_walk",))
+        found.append(motion.table[0].parameters["q"])
+        evidence = gather(z, np.array(4.0), one_stretch(z), rate_hz, 0.0, None)
+    assert np.mean(found) == pytest.approx(q, rel=0.15)
     assert evidence is not None
-    assert [one.size for one in evidence.series] == [1, 1, 1, 1, 25]
-    assert sum(len(one.z) for one in evidence.series) < 50_000
+    assert [one.size for one in evidence.series] == [1, 1, 1, 1, 49]
+    assert sum(len(one.z) for one in evidence.series) < 25_000
 
 
 def test_only_moving_samples_count():
@@ -155,6 +157,33 @@ def test_only_moving_samples_count():
     whole = choose_motion(z, 0.01, one_stretch(z), 100.0, models=DRIVEN, moving=moving)
     alone = choose_motion(part, 0.01, one_stretch(part), 100.0, models=DRIVEN)
     assert (whole.model, whole.parameters) == (alone.model, alone.parameters)
+
+
+def test_what_smooths_best_is_not_what_is_most_likely():
+    """Known truth: band-limited motion, of which a jerk model's likelihood smooths too little.
+
+    The tuned smoother's error is at least 5 % less in the mean of 4 tries.
+    """
+    ratios = []
+    for seed in range(4):
+        truth = band_limited(seed, 12000, 100.0, 20.0, 0.5)
+        z = truth + white(seed + 50, 12000)
+        motion = choose_motion(z, 1.0, one_stretch(z), 100.0, models=("jerk",))
+        likely = replace(motion, parameters=motion.table[0].parameters)
+        errors = [np.std(smooth(z, 1.0, one_stretch(z), 100.0, one).rate - truth) for one in (motion, likely)]
+        ratios.append(errors[0] / errors[1])
+    assert np.mean(ratios) < 0.95
+
+
+def test_the_reference_engine_gives_the_same_table():
+    # Expected: filterpy's log-likelihoods of the same parameters.
+    z = np.cumsum(white(4, 300)) * 0.1 + white(5, 300)
+    ours, theirs = (
+        choose_motion(z, 1.0, one_stretch(z), 10.0, 0.3, ("random_walk", "markov"), engine=which)
+        for which in ("native", "reference")
+    )
+    assert [row.log_likelihood for row in theirs.table] == pytest.approx([row.log_likelihood for row in ours.table])
+    assert theirs.parameters == ours.parameters
 
 
 def test_gaps_and_samples_that_say_nothing():

@@ -1,4 +1,9 @@
-"""Which model of the rate, with which parameters: by maximum likelihood and BIC."""
+"""Which model of the rate, with which parameters: by maximum likelihood, then by the error of the smoother itself.
+
+The likelihood is the score of a filter: each sample given those before it. A rate is of no model exactly, and then the
+parameters that filter best are not those that smooth best: of motion limited to a band they smooth too little. So the
+models that are most likely are tuned, and compared, by an unbiased estimate of the smoother's squared error.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +26,12 @@ GRID = 0.35
 TRIES = 200
 """Evaluations of the likelihood of one search over several parameters."""
 HIGHEST_DAMPING = 20.0
+HIGHEST = 0.2
+"""Frequency of an oscillation over the sample rate: what is faster is the noise's own colour."""
+FINALISTS = 2
+NEAR = {"q": 1e4, "tau_s": 1e3, "sd": 1e2, "frequency_hz": 3.0, "second_hz": 3.0, "damping": 1e4, "second_damping": 1e4}
+"""How far from the most likely parameters those that smooth best are looked for, as a factor either way."""
+FIRST_STEP = {"q": -1.5, "tau_s": 0.5, "sd": -0.3, "frequency_hz": 0.1, "second_hz": 0.1}
 NARROW = 1e-4
 """Damping of an oscillation that is a sinusoid: no second oscillator drives it."""
 FLAT = {
@@ -46,24 +57,65 @@ def choose_motion(
     engine: str = "native",
     moving: np.ndarray | None = None,
 ) -> Motion:
-    """The model of the rate with the smallest BIC, each with the parameters of its greatest likelihood.
+    """The model of the rate that smooths best, of those that are most likely.
 
     z, r, segment, rate_hz, phi : as in vgyro.fusion.smoother.smooth;  moving : [T] bool, only these samples count
     models : names of those to choose from
-    Of more than 2^15 samples, four windows of 2^13 samples spread over the recording are used, and means of blocks of
-    the whole of it, about 2^14, whose model is exact (but for the correlation of coloured noise between blocks); their
-    log-likelihoods are added. It is the likelihood given the first 16 samples of each stretch: no model pays for not
-    knowing where it starts. A constant rate is a legal answer: q = 0.
+    Each model has the parameters of its greatest likelihood. Of the FINALISTS of smallest BIC the parameters are then
+    tuned to the smallest estimated error, in units of the noise, and the model of the smallest
+    error + (parameters)·ln(samples) is taken. A constant rate is a legal answer: q = 0.
+    Of more than 2^14 samples, four windows of 2^12 samples spread over the recording are used, and means of blocks of
+    the whole of it, about 2^13, whose model is exact (but for the correlation of coloured noise between blocks); their
+    scores are added. The likelihood is that given the first 16 samples of each stretch: no model pays for not knowing
+    where it starts. The search is the native engine's; another one gives the log-likelihoods of the table.
     raises : DataError if the samples do not change, or if r is not above zero; TooShort
     """
-    evidence = gather(z, r, segment, rate_hz, phi, engine, moving)
-    rows = tuple(_row(model, _FITS[model](evidence), evidence) for model in models)
-    for best in sorted(rows, key=lambda row: row.bic):
-        motion = Motion(best.model, best.parameters, rate_hz, rows)
+    evidence = gather(z, r, segment, rate_hz, phi, moving)
+    fits = sorted((_row(model, _FITS[model](evidence), evidence) for model in models), key=lambda row: row.bic)
+    finalists = [_tuned(row, evidence) for row in fits[:FINALISTS]]
+    rows = {row.model: row for row in fits[FINALISTS:] + finalists}
+    if engine != evidence.engine:
+        rows = {name: _checked(row, evidence, engine) for name, row in rows.items()}
+    table = tuple(rows[model] for model in models)
+    for best in sorted(finalists, key=lambda row: row.risk + _penalty(row)):
+        motion = Motion(best.model, best.tuned, rate_hz, table)
         factor = calibration(motion, evidence)
-        if math.isfinite(best.bic) and factor is not None:
+        if math.isfinite(best.risk) and factor is not None:
             return replace(motion, calibration=factor)
     raise DataError("no motion model fits: every smoother breaks down", remedy="look for outliers in rate and noise")
+
+
+def _row(model: str, parameters: Parameters, evidence: Evidence, engine: str = "") -> Likelihood:
+    total, count = evidence.log_likelihood(model, parameters, engine)
+    row = Likelihood(model, total, math.inf, parameters, count)
+    return replace(row, bic=_penalty(row) - 2.0 * total)
+
+
+def _penalty(row: Likelihood) -> float:
+    # The frequency counts twice: it is the best of as many lines as there are samples.
+    free = len(row.parameters) + ("frequency_hz" in row.parameters) - (row.parameters.get("q") == 0.0)
+    return free * math.log(row.samples)
+
+
+def _checked(row: Likelihood, evidence: Evidence, engine: str) -> Likelihood:
+    again = _row(row.model, dict(row.parameters), evidence, engine)
+    return replace(row, log_likelihood=again.log_likelihood, bic=again.bic)
+
+
+def _tuned(row: Likelihood, evidence: Evidence) -> Likelihood:
+    """With the smallest error, near the parameters of the greatest likelihood. A sinusoid stays as it is."""
+    start = {name: value for name, value in row.parameters.items() if value > 0.0}
+    best = dict(row.parameters)
+    if start and row.parameters.get("damping", 1.0) > NARROW:
+        bounds = {name: (value / NEAR[name], value * NEAR[name]) for name, value in start.items()}
+        fixed = {name: value for name, value in row.parameters.items() if name not in start}
+
+        def score(parameters: Parameters) -> float:
+            return -0.5 * evidence.risk(row.model, parameters)
+
+        found = _search(score, [start], bounds, fixed, FIRST_STEP)
+        best = found if score(found) > score(best) else best
+    return replace(row, risk=evidence.risk(row.model, best), tuned=best)
 
 
 def _driven(model: str, order: int) -> Callable[[Evidence], Parameters]:
@@ -96,8 +148,12 @@ def _markov(evidence: Evidence) -> Parameters:
     q = _FITS["random_walk"](evidence)["q"]
     sd = math.sqrt(evidence.excess)
     tau = 2.0 * sd**2 / q if q > 0 else 0.1 * evidence.duration_s
+
+    def likelihood(parameters: Parameters) -> float:
+        return evidence.log_likelihood("markov", parameters)[0]
+
     bounds = {"tau_s": (0.1 / evidence.rate_hz, 1e4 * evidence.duration_s), "sd": (1e-6 * sd, 1e6 * sd)}
-    return _search(evidence, "markov", [{"tau_s": tau, "sd": sd}], bounds, {})
+    return _search(likelihood, [{"tau_s": tau, "sd": sd}], bounds, {}, {})
 
 
 def _oscillator(evidence: Evidence) -> Parameters:
@@ -106,62 +162,60 @@ def _oscillator(evidence: Evidence) -> Parameters:
     Starts narrow at the highest line of the periodogram, and wide at the r.m.s. frequency of the rate.
     """
     line, centre = _frequencies(evidence)
-    sd, half = math.sqrt(evidence.excess), 0.5 * evidence.rate_hz
-    hertz, losses = (0.01 / evidence.duration_s, half), (1e-9, HIGHEST_DAMPING)
+    sd, fastest = math.sqrt(evidence.excess), HIGHEST * evidence.rate_hz
+    hertz, losses = (0.01 / evidence.duration_s, fastest), (1e-9, HIGHEST_DAMPING)
     bounds = {"frequency_hz": hertz, "damping": losses, "sd": (1e-6 * sd, 1e6 * sd)}
     starts = [{"frequency_hz": line, "damping": 0.02, "sd": sd}, {"frequency_hz": centre, "damping": 0.5, "sd": sd}]
-    found = [_search(evidence, "oscillator", starts, bounds, {"q": 0.0})]
+
+    def likelihood(parameters: Parameters) -> float:
+        return evidence.log_likelihood("oscillator", parameters)[0]
+
+    found = [_search(likelihood, starts, bounds, {"q": 0.0}, {})]
     slow = evidence.noise_density * (2.0 * math.pi * min(0.1 * found[0]["frequency_hz"], 1.0)) ** 2
     wider = bounds | {"q": (1e-12 * slow, 1e6 * slow)}
-    found.append(_search(evidence, "oscillator", [found[0] | {"q": slow}], wider, {}))
+    found.append(_search(likelihood, [found[0] | {"q": slow}], wider, {}, {}))
     still = evidence.log_likelihood("random_walk", {"q": 0.0})[0]
-    certain = evidence.log_likelihood("oscillator", found[0])[0] - still > CERTAIN
+    certain = likelihood(found[0]) - still > CERTAIN
     if certain and NARROW < found[0]["damping"] < 1.0:
         start = {name: value * found[0].get(of, 1.0) for name, (value, of) in FLAT.items()}
-        near = (0.1 * found[0]["frequency_hz"], min(10.0 * found[0]["frequency_hz"], half))
+        near = (0.1 * found[0]["frequency_hz"], min(10.0 * found[0]["frequency_hz"], fastest))
         wider = bounds | dict.fromkeys(("frequency_hz", "second_hz"), near)
         wider |= dict.fromkeys(("damping", "second_damping"), (1e-3, 2.0))
-        found.append(_search(evidence, "oscillator", [start], wider, {}))
+        found.append(_search(likelihood, [start], wider, {}, {}))
     return min(found, key=lambda parameters: _row("oscillator", parameters, evidence).bic)
 
 
-def _row(model: str, parameters: Parameters, evidence: Evidence) -> Likelihood:
-    total, count = evidence.log_likelihood(model, parameters)
-    # The frequency counts twice: it is the best of as many lines as there are samples.
-    free = len(parameters) + ("frequency_hz" in parameters) - (parameters.get("q") == 0.0)
-    return Likelihood(model, total, -2.0 * total + free * math.log(count), parameters, count)
-
-
 def _search(
-    evidence: Evidence,
-    model: str,
+    score: Callable[[Parameters], float],
     starts: list[Parameters],
     bounds: Mapping[str, tuple[float, float]],
     fixed: Parameters,
+    first_step: Mapping[str, float],
 ) -> Parameters:
-    """Greatest likelihood over the logarithms of the parameters, by Nelder & Mead from each start, then again from the
-    best place."""
+    """Greatest score over the logarithms of the parameters, by Nelder & Mead from each start, then again from the best
+    place."""
     from scipy.optimize import minimize
 
     names = list(bounds)
     lowest, highest = np.log(np.array([bounds[name] for name in names])).T
+    steps = np.diag([first_step.get(name, 0.7) for name in names])
 
     def parameters(logs: np.ndarray) -> Parameters:
         return dict(zip(names, np.exp(np.clip(logs, lowest, highest)).tolist(), strict=True)) | fixed
 
     def cost(logs: np.ndarray) -> float:
         outside = float(np.sum(np.maximum(lowest - logs, 0.0) + np.maximum(logs - highest, 0.0)))
-        return -evidence.log_likelihood(model, parameters(logs))[0] + 1e3 * outside
+        return -score(parameters(logs)) + 1e3 * outside
 
     def run(start: np.ndarray, size: float) -> tuple[float, np.ndarray]:
-        simplex = np.vstack([start, start + size * np.eye(len(start))])
+        simplex = np.vstack([start, start + size * steps])
         options = {"initial_simplex": simplex, "maxfev": TRIES, "xatol": 0.02, "fatol": NO_GAIN}
         found = minimize(cost, start, method="Nelder-Mead", options=options)
         return float(found.fun), found.x
 
     logs = [np.clip(np.log([start[name] for name in names]), lowest, highest) for start in starts]
-    value, place = min((run(one, 0.7) for one in logs), key=lambda found: found[0])
-    again, other = run(place, -0.3)
+    value, place = min((run(one, 1.0) for one in logs), key=lambda found: found[0])
+    again, other = run(place, -0.4)
     return parameters(other if again < value else place)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,10 +14,10 @@ from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError, TooShort
 from vgyro.fusion.motion_models import Dynamics, dynamics
 
-MOST_SAMPLES = 1 << 15
+MOST_SAMPLES = 1 << 14
 """A recording of no more samples is used as it is. Of a longer one: windows at its full rate, and block means."""
-WINDOWS, WINDOW = 4, 1 << 13
-BLOCKS = 1 << 14
+WINDOWS, WINDOW = 4, 1 << 12
+BLOCKS = 1 << 13
 RUNS = 16
 """The most gap-free stretches that are used, the longest ones."""
 SHORTEST = 32
@@ -55,11 +55,38 @@ class Evidence:
     duration_s: float
     excess: float
     phi: float
-    engine: str
+    engine: str = "native"
 
-    def log_likelihood(self, model: str, parameters: Mapping[str, float]) -> tuple[float, int]:
+    def log_likelihood(self, model: str, parameters: Mapping[str, float], engine: str = "") -> tuple[float, int]:
         """Summed over the series, and the number of samples that were predicted; -inf where a model breaks down."""
-        run = engines.get(self.engine).statespace.log_likelihood
+        run = engines.get(engine or self.engine).statespace.log_likelihood
+        total, count = self._sum(
+            model, parameters, lambda one, space: run(one.z, one.r, space, min(SKIP, len(one.z) // 4))
+        )
+        return (total if math.isfinite(total) else -math.inf), count
+
+    def risk(self, model: str, parameters: Mapping[str, float]) -> float:
+        """Unbiased estimate of the smoother's squared error, in units of the noise at low frequency, summed, but for a
+        constant; infinite where a model breaks down.
+
+        E(ŵ - w)² = E(z - ŵ)² - r + 2·cov(ŵ, v), and the covariance is the variance P that the smoother claims, whatever
+        the rate does and whatever the noise's colour is. Stein (1981), Ann. Statist. 9, 1135-1151.
+        """
+        run = engines.get(self.engine).statespace.smooth
+
+        def of(one: Series, space: StateSpace) -> tuple[float, int]:
+            smoothed, variance = run(one.z, one.r, space)
+            told = np.isfinite(one.r)
+            if not np.all(variance > 0.0):
+                return math.inf, 0
+            squares = (one.z[told] - smoothed[told]) ** 2 + 2.0 * variance[told]
+            return float(np.sum(squares / one.r[told])) * (1.0 - one.phi) / (1.0 + one.phi), 0
+
+        return self._sum(model, parameters, of)[0]
+
+    def _sum(
+        self, model: str, parameters: Mapping[str, float], run: Callable[[Series, StateSpace], tuple[float, int]]
+    ) -> tuple[float, int]:
         total, count = 0.0, 0
         single = dynamics(model, parameters, 1.0 / self.rate_hz)
         blocks = {size: single.of_blocks(size) for size in {one.size for one in self.series} if size > 1}
@@ -69,10 +96,9 @@ class Evidence:
             if start is None:
                 continue
             space = StateSpace(own.transition, own.process, own.reads, own.reads, *start, pole=one.phi)
-            skip = min(SKIP, len(one.z) // 4)
-            likelihood, terms = run(one.z, one.r, space, skip)
-            total, count = total + likelihood, count + terms
-        return (total if math.isfinite(total) else -math.inf), count
+            score, terms = run(one, space)
+            total, count = total + score, count + terms
+        return total, count
 
 
 def wide_start(z: np.ndarray, r: np.ndarray, model: Dynamics, size: int = 1) -> tuple[np.ndarray, np.ndarray] | None:
@@ -107,7 +133,6 @@ def gather(
     segment: np.ndarray,
     rate_hz: float,
     phi: float,
-    engine: str,
     moving: np.ndarray | None,
 ) -> Evidence:
     """The stretches of a recording on which models are compared."""
@@ -133,7 +158,7 @@ def gather(
     density = float(np.median(noises / np.repeat([one.shrink for one in told], [_told(one) for one in told])))
     density *= (1.0 + phi) / (1.0 - phi) / rate_hz
     excess = max(float(np.var(values)) - float(np.mean(noises)), 1e-3 * density * rate_hz / math.sqrt(total))
-    return Evidence(told, rate_hz, density, total / rate_hz, excess, phi, engine)
+    return Evidence(told, rate_hz, density, total / rate_hz, excess, phi)
 
 
 def _told(one: Series) -> int:

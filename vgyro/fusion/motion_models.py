@@ -25,13 +25,21 @@ HALF_POWER = math.sqrt(0.5)
 
 @dataclass(frozen=True)
 class Likelihood:
-    """How well a model fits: its greatest log-likelihood, -2·log L + (parameters)·ln(samples), where, of how many."""
+    """How well a model fits.
+
+    log_likelihood : the greatest, of each sample given those before it;  parameters : where it is;  samples : how many
+    bic      : -2·log_likelihood + (parameters)·ln(samples)
+    risk     : the least squared error of the smoother, estimated, in units of the noise, summed, but for a constant
+    tuned    : where that is; NaN and empty where it was not looked for
+    """
 
     model: str
     log_likelihood: float
     bic: float
     parameters: Mapping[str, float]
     samples: int
+    risk: float = math.nan
+    tuned: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ cdef extern from "statespace.h" nogil:
     void vg_statespace_likelihood(const vg_statespace *model, const vg_measured *measured, const double *start,
                                   const double *spread, Py_ssize_t skip, vg_likelihood *result)
     int vg_statespace_smooth(const vg_statespace *model, const vg_measured *measured, const double *start,
-                             const double *spread, double *smoothed, double *variance, vg_likelihood *left_out)
+                             const double *spread, double *smoothed, double *variance)
 
 MOST_STATES = 5
 
@@ -65,14 +65,11 @@ def likelihood(const double[::1] z, const double[::1] noise, const uint8_t[::1] 
 def smooth(const double[::1] z, const double[::1] noise, const uint8_t[::1] regime,
            const double[:, :, ::1] transition, const double[:, :, ::1] process, const double[::1] reads,
            const double[::1] wanted, bint coloured, const double[::1] start, const double[:, ::1] spread,
-           double[::1] smoothed, double[::1] variance) -> tuple:
-    """Fills smoothed and variance; of the samples left out one by one Σ v²/f, and Π f as in likelihood."""
+           double[::1] smoothed, double[::1] variance) -> None:
     cdef vg_statespace model = _model(transition, process, reads, wanted, coloured)
     cdef vg_measured measured = _measured(z, noise, regime)
-    cdef vg_likelihood found
     cdef int status
     with nogil:
-        status = vg_statespace_smooth(&model, &measured, &start[0], &spread[0, 0], &smoothed[0], &variance[0], &found)
+        status = vg_statespace_smooth(&model, &measured, &start[0], &spread[0, 0], &smoothed[0], &variance[0])
     if status == -2:
         raise MemoryError
-    return found.squares, found.product, found.exponent, found.count

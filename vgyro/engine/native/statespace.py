@@ -26,34 +26,9 @@ def log_likelihood(
     z, r, flags, whole = checked(z, r, model, regime)
     if len(z) == 0:
         return 0.0, 0
-    found = _statespace.likelihood(
+    squares, product, exponent, count = _statespace.likelihood(
         z, r, flags, whole.transition, whole.process, whole.reads, model.coloured, whole.start, whole.spread, skip
     )
-    return _score(*found)
-
-
-def leave_one_out(
-    z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None = None
-) -> tuple[float, int]:
-    """Log score of each sample as predicted from all the others of the stretch, and of how many samples it is.
-
-    z, r, regime : as in log_likelihood
-    returns      : -½Σ(log 2π + log f + v²/f), v and f of a sample whose own value was left out, and the number of terms
-    raises       : EngineError that names the first sample that cannot be used
-    de Jong (1988), Biometrika 75, 594-600: from one pass of the smoother.
-    """
-    z, r, flags, whole = checked(z, r, model, regime)
-    if len(z) == 0:
-        return 0.0, 0
-    unused = np.empty((2, len(z)))
-    found = _statespace.smooth(
-        z, r, flags, whole.transition, whole.process, whole.reads, whole.wanted, model.coloured, whole.start,
-        whole.spread, *unused,
-    )  # fmt: skip
-    return _score(*found)
-
-
-def _score(squares: float, product: float, exponent: int, count: int) -> tuple[float, int]:
     if not product > 0.0:
         return -math.inf, count
     determinant = math.log(product) + exponent * math.log(2.0)

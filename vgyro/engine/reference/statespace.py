@@ -64,40 +64,6 @@ def smooth(
     return x @ whole.wanted, np.einsum("i,tij,j->t", whole.wanted, P, whole.wanted)
 
 
-def leave_one_out(
-    z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None = None
-) -> tuple[float, int]:
-    """Log score of each sample as predicted from all the others of the stretch, and of how many samples it is.
-
-    z, r, regime : as in log_likelihood
-    returns      : -½Σ(log 2π + log f + v²/f), v and f of a sample whose own value was left out, and the number of terms
-    raises       : EngineError that names the first sample that cannot be used
-    de Jong (1988), Biometrika 75, 594-600, back through the gains of filterpy.
-    """
-    z, r, flags, whole = checked(z, r, model, regime)
-    variances = np.broadcast_to(r, len(z))
-    filter_, kept = _filter(whole), []
-    for index in range(len(z)):
-        told = _step(filter_, whole, z, variances, flags, index)
-        kept.append((filter_.y.item() / filter_.S.item(), 1.0 / filter_.S.item(), filter_.K[:, 0]) if told else None)
-    states = len(whole.reads)
-    score, information, total, count = np.zeros(states), np.zeros((states, states)), 0.0, 0
-    for index in range(len(z) - 1, -1, -1):
-        update = kept[index]
-        if update is not None:
-            error, precision = update[0] - update[2] @ score, update[1] + update[2] @ information @ update[2]
-            total -= 0.5 * (math.log(2.0 * math.pi / precision) + error**2 / precision)
-            count += 1
-            reads = _reads(whole, variances[index])
-            rest = np.eye(states) - np.outer(update[2], reads)
-            score = rest.T @ score + reads * update[0]
-            information = rest.T @ information @ rest + np.outer(reads, reads) * update[1]
-        if index > 0:
-            F = whole.transition[_regime(flags, index)]
-            score, information = F.T @ score, F.T @ information @ F
-    return total, count
-
-
 def _filter(whole: StateSpace) -> KalmanFilter:
     from filterpy.kalman import KalmanFilter
 
@@ -116,15 +82,11 @@ def _step(
         filter_.predict(F=whole.transition[place], Q=whole.process[place])
     if np.isinf(variances[index]):
         return False
-    reads = _reads(whole, variances[index])[None, :]
+    reads = whole.reads[None, :].copy()
+    if whole.coloured:
+        reads[0, -1] = math.sqrt(variances[index])
     filter_.update(z[index], R=0.0 if whole.coloured else variances[index], H=reads)
     return True
-
-
-def _reads(whole: StateSpace, variance: float) -> np.ndarray:
-    if not whole.coloured:
-        return whole.reads
-    return np.append(whole.reads[:-1], math.sqrt(variance))
 
 
 def _regime(flags: np.ndarray, index: int) -> int:

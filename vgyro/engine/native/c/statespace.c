@@ -90,23 +90,13 @@ VG_INLINE void begin(const int n, const double *start, const double *spread, vg_
     memcpy(b->P, spread, (size_t)(n * n) * sizeof(double));
 }
 
-VG_INLINE void count_in(double square, double variance, vg_likelihood *sum) {
-    sum->squares += square;
-    sum->product *= variance > 0.0 ? variance : NAN;
-    sum->count++;
-    if (sum->product < 0x1p-200 || sum->product > 0x1p200) {
-        int part;
-        sum->product = frexp(sum->product, &part);
-        sum->exponent += part;
-    }
-}
-
 VG_INLINE void likelihood(const int n, const vg_statespace *s, const vg_measured *m, const double *start,
                           const double *spread, ptrdiff_t skip, vg_likelihood *result) {
     vg_belief b;
     vg_update u;
     begin(n, start, spread, &b);
-    *result = (vg_likelihood){0.0, 1.0, 0, 0};
+    double squares = 0.0, product = 1.0;
+    int64_t exponent = 0, count = 0;
     for (ptrdiff_t t = 0; t < m->samples; t++) {
         if (t > 0) predict_to(n, s, m, t, &b);
         if (!update(n, s->coloured, s->reads, m->z[t], m->noise[t * m->noise_step], &b, &u)) continue;
@@ -114,8 +104,16 @@ VG_INLINE void likelihood(const int n, const vg_statespace *s, const vg_measured
             skip--;
             continue;
         }
-        count_in(u.innovation * u.innovation / u.variance, u.variance, result);
+        squares += u.innovation * u.innovation / u.variance;
+        product *= u.variance > 0.0 ? u.variance : NAN;
+        count++;
+        if (product < 0x1p-200 || product > 0x1p200) {
+            int part;
+            product = frexp(product, &part);
+            exponent += part;
+        }
     }
+    *result = (vg_likelihood){squares, product, exponent, count};
 }
 
 /* The filter over samples [first, stop), whose belief before its first measurement is b; steps NULL: nothing is kept. */
@@ -168,10 +166,8 @@ VG_INLINE void carry_back(const int n, const double *F, double *a, double *A) {
     }
 }
 
-/* a ← a + h u, A ← (I - K h')' A (I - K h') + h h'/f, with u = v/f - K'a. The sample less what all others say of it is
-   u/D, of the variance 1/D, D = 1/f + K'A K (de Jong 1988, Biometrika 75, 594-600). */
-VG_INLINE void take_back(const int n, const double *reads, int coloured, const vg_step *step, double *a, double *A,
-                         vg_likelihood *left_out) {
+/* a ← a + h (v/f - K'a), A ← (I - K h')' A (I - K h') + h h'/f. */
+VG_INLINE void take_back(const int n, const double *reads, int coloured, const vg_step *step, double *a, double *A) {
     const double *K = step->gain;
     double h[VG_STATES], AK[VG_STATES], part = step->innovation, square = step->precision;
     FOR(i) h[i] = reads[i];
@@ -185,7 +181,6 @@ VG_INLINE void take_back(const int n, const double *reads, int coloured, const v
         part -= K[i] * a[i];
         square += K[i] * AK[i];
     }
-    count_in(part * part / square, 1.0 / square, left_out);
     FOR(i) a[i] += h[i] * part;
     FOR(i) for (int j = 0; j <= i; j++) {
         double sum = A[i * n + j] - (h[i] * AK[j] + AK[i] * h[j]) + h[i] * h[j] * square;
@@ -194,8 +189,7 @@ VG_INLINE void take_back(const int n, const double *reads, int coloured, const v
 }
 
 VG_INLINE int smooth(const int n, const vg_statespace *s, const vg_measured *m, const double *start,
-                     const double *spread, double *smoothed, double *variance, vg_likelihood *left_out) {
-    *left_out = (vg_likelihood){0.0, 1.0, 0, 0};
+                     const double *spread, double *smoothed, double *variance) {
     ptrdiff_t chunks = (m->samples + VG_STATESPACE_CHUNK - 1) / VG_STATESPACE_CHUNK;
     if (chunks == 0) return 0;
     vg_belief *kept = malloc((size_t)chunks * sizeof(vg_belief));
@@ -230,7 +224,7 @@ VG_INLINE int smooth(const int n, const vg_statespace *s, const vg_measured *m, 
             }
             smoothed[t] = mean;
             variance[t] = step->variance - less;
-            if (step->precision > 0.0) take_back(n, s->reads, s->coloured, step, a, A, left_out);
+            if (step->precision > 0.0) take_back(n, s->reads, s->coloured, step, a, A);
         }
     }
     free(kept);
@@ -255,9 +249,9 @@ void vg_statespace_likelihood(const vg_statespace *model, const vg_measured *mea
 }
 
 int vg_statespace_smooth(const vg_statespace *model, const vg_measured *measured, const double *start,
-                         const double *spread, double *smoothed, double *variance, vg_likelihood *left_out) {
+                         const double *spread, double *smoothed, double *variance) {
     int status = 0;
-#define CALL(n) status = smooth(n, model, measured, start, spread, smoothed, variance, left_out)
+#define CALL(n) status = smooth(n, model, measured, start, spread, smoothed, variance)
     EACH_SIZE(CALL)
 #undef CALL
     return status;

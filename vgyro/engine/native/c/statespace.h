@@ -30,21 +30,19 @@ typedef struct {
     ptrdiff_t samples;
 } vg_measured;
 
-/* Of errors v of predictions and their variances f: Σ v²/f, and Π f = product · 2^exponent over `count`; product is NaN
-   where an f is not above zero. */
+/* Innovations after the first `skip` of them: Σ v²/f, and Π f = product · 2^exponent over `count`; product is NaN where
+   an f is not above zero. */
 typedef struct {
     double squares, product;
     int64_t exponent, count;
 } vg_likelihood;
 
-/* Of the innovations after the first `skip` of them.
-   start [states], spread [states, states]: mean and covariance of the state at the first sample, before it is measured. */
+/* start [states], spread [states, states]: mean and covariance of the state at the first sample, before it is measured. */
 void vg_statespace_likelihood(const vg_statespace *model, const vg_measured *measured, const double *start,
                               const double *spread, ptrdiff_t skip, vg_likelihood *result);
 
-/* Mean and variance of c'x_t given all samples: smoothed, variance [samples]. left_out: of each sample, predicted from all
-   others. Returns 0, or -2 without memory. */
+/* Mean and variance of c'x_t given all samples: smoothed, variance [samples]. Returns 0, or -2 without memory. */
 int vg_statespace_smooth(const vg_statespace *model, const vg_measured *measured, const double *start,
-                         const double *spread, double *smoothed, double *variance, vg_likelihood *left_out);
+                         const double *spread, double *smoothed, double *variance);
 
 #endif
