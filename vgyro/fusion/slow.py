@@ -1,7 +1,7 @@
 """Slow errors of the gyros, from their differences and where the board stands still, by a two-sided smoother.
 
 The common part of the biases cannot be told from the motion by differences: the biases are about the robust centre that
-their prior gives, and with the walk of the common part unseen, its variance grows with time. Standstill pins it. See
+their prior gives, at the start where they walk, throughout where the walks fade. Standstill pins it. See
 vgyro.fusion.slow_model.
 """
 
@@ -15,8 +15,8 @@ from vgyro.errors import DataError
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_choice import Choice, Walk, choose
-from vgyro.fusion.slow_model import Constants, Evidence, empirical_prior, posterior
+from vgyro.fusion.slow_choice import Choice, choose
+from vgyro.fusion.slow_model import Constants, Evidence, Walk, empirical_prior, posterior
 from vgyro.fusion.slow_smoother import run_smoother
 from vgyro.units import rrw_deg_h_rt_h
 
@@ -47,7 +47,7 @@ class SlowErrors:
     bias       : b̂ [B, N], deg/s, with what follows the temperature;  covariance : of b̂ - b [B, N, N], (deg/s)²
     anchored   : standstill pins their common part
     temperature : coefficients; None: not regressed on
-    walk       : the random walks as used;  constants : posterior of the initial biases (and slopes)
+    walk       : the random walks as used;  constants : posterior of what does not walk
     note       : what to know of them
     """
 
@@ -74,18 +74,19 @@ def slow_errors(
     variance: np.ndarray,
     correlation: np.ndarray | None = None,
     blocks: SlowBlocks | None = None,
-    tune: bool = True,
+    walk: Walk | None = None,
 ) -> SlowErrors:
     """Slow errors b_i(t) of the gyros, two-sided, so without delay, whatever the motion.
 
     variance    : [N] or [B, N], (deg/s)² of a sample, such that variance/n is that of the mean of n samples: of
                   coloured noise the long-run one. Where it is not finite or not above 0 the gyro is not used
     correlation : [N, N] of the noise; None: that of array.noise
-    blocks      : SlowBlocks.of(array);  tune : take K by the likelihood of the blocks where that gains enough
+    blocks      : SlowBlocks.of(array);  walk : the random walks; None: as their likelihood prefers, beginning with
+                  array.noise.rrw
     returns     : SlowErrors
     raises      : DataError where the correlation is not positive definite, or the variance does not fit
     Model: vgyro.fusion.slow_model; with the noise of the walks K_i·K_j·corr_ij, that of Bayard & Ploen
-    (US 2003/0187623), smoothed. Gyros at fault are left out of the blocks they touch.
+    (US 2003/0187623), smoothed. Walks that fade stand for flicker. Gyros at fault are left out of the blocks they touch.
     """
     blocks = SlowBlocks.of(array) if blocks is None else blocks
     gyros = array.rate.shape[1]
@@ -100,11 +101,11 @@ def slow_errors(
     centre = 0.0 if degrees is None else float(np.average(degrees, weights=blocks.length))
     relative = None if degrees is None else degrees - centre
     evidence = Evidence.of(array, blocks, variance, noise, resting, relative)
-    choice = choose(evidence, blocks, array.noise.rrw, array.noise.correlation, _usual_arw(variance, array), tune)
-    constants = posterior(choice.filtered, empirical_prior(choice.filtered, gyros))
+    choice = choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk)
+    constants = posterior(choice.filtered, empirical_prior(evidence, choice.filtered))
     state, covariance = run_smoother(choice.information, choice.filtered)
-    bias, covariance = _with_constants(state, covariance, constants, relative if choice.slopes else None)
-    slopes = slice(gyros, 2 * gyros)
+    bias, covariance = _with_constants(state, covariance, constants, evidence.design)
+    slopes = slice(evidence.plain, None)
     warming = (
         Temperature(constants.mean[slopes], constants.covariance[slopes, slopes], centre) if choice.slopes else None
     )
@@ -122,14 +123,10 @@ def _usual_arw(variance: np.ndarray, array: ArrayRates) -> np.ndarray:
 
 
 def _with_constants(
-    state: np.ndarray, covariance: np.ndarray, constants: Constants, temperature: np.ndarray | None
+    state: np.ndarray, covariance: np.ndarray, constants: Constants, design: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Biases [B, N] and their covariance: b = walk of the measurement + (D - walk of the regressors D)·β."""
-    gyros = state.shape[1]
-    regressors = -state[..., 1:]
-    regressors[..., :gyros] += np.eye(gyros)
-    if temperature is not None:
-        regressors[..., gyros:] += temperature[:, None, None] * np.eye(gyros)
+    regressors = design[..., : len(constants.mean)] - state[..., 1:]
     bias = state[..., 0] + regressors @ constants.mean
     added = (regressors @ constants.covariance) @ regressors.transpose(0, 2, 1)
     return bias, covariance + added
@@ -168,16 +165,13 @@ def _temperature(array: ArrayRates, parameters: FilterParameters, blocks: SlowBl
 
 
 def _of_walk(array: ArrayRates, walk: Walk) -> str:
-    gained = f"(2Δ log L = {walk.gain:.1f})"
-    if walk.how == "each":
-        return f"K = {', '.join(f'{rrw_deg_h_rt_h(one):.3g}' for one in walk.rrw)} deg/h/√h by likelihood {gained}"
-    if walk.how == "together" and not np.any(array.noise.rrw > 0):
-        return f"no random walk is known: K = {rrw_deg_h_rt_h(walk.rrw[0]):.3g} deg/h/√h of all by likelihood {gained}"
-    unknown = np.flatnonzero(~np.isfinite(array.noise.rrw))
-    which = ", ".join(str(index + 1) for index in unknown)
-    without = f"no random walk is known of gyro {which}: its bias is constant" if which else ""
-    scale = walk.rrw.max() / np.nanmax(array.noise.rrw) if walk.how == "together" else 1.0
-    return "; ".join(filter(None, [without, f"K × {scale:.3g} by likelihood {gained}" if scale != 1.0 else ""]))
+    if walk.how == "given":
+        unknown = np.flatnonzero(~np.isfinite(array.noise.rrw))
+        which = ", ".join(str(index + 1) for index in unknown)
+        return f"no random walk is known of gyro {which}: its bias is constant" if which else ""
+    sizes = ", ".join(f"{rrw_deg_h_rt_h(one):.3g}" for one in walk.rrw)
+    fading = f", fading in {walk.tau_s:.3g} s" if np.isfinite(walk.tau_s) else ""
+    return f"K = {sizes} deg/h/√h{fading}, by likelihood (2Δ log L = {walk.gain:.1f})"
 
 
 def _of_temperature(choice: Choice, anchored: bool) -> str:

@@ -14,6 +14,7 @@ from vgyro.fusion.events import excluded
 
 MOST_NUMBERS = 8_000_000
 """Blocks × N² at most: those of a larger array are longer."""
+MOST_STEPS = 12
 
 
 @dataclass(frozen=True)
@@ -104,11 +105,15 @@ class SlowBlocks:
                 touched[start:stop, gyro] = True
         return touched
 
-    def jumps(self, array: ArrayRates) -> np.ndarray:
-        """Variance [B, N], (deg/s)², by which a bias may have changed after a drift or a step of its gyro."""
-        added = np.zeros((len(self), array.rate.shape[1]))
-        for event in array.faults:
-            back = int(np.searchsorted(self.first, event.stop, side="left"))
-            if event.kind in ("drift", "step") and np.isfinite(event.size) and back < len(self):
-                added[back, event.gyro] += event.size**2
-        return added
+    def steps(self, array: ArrayRates) -> list[tuple[int, int, float]]:
+        """Biases that may be others after a drift or a step of their gyro: first block after it, gyro, size in deg/s.
+
+        MOST_STEPS of them at most, the largest.
+        """
+        found = [
+            (int(np.searchsorted(self.first, event.stop, side="left")), event.gyro, abs(event.size))
+            for event in array.faults
+            if event.kind in ("drift", "step") and np.isfinite(event.size)
+        ]
+        inside = [one for one in found if one[0] < len(self)]
+        return sorted(sorted(inside, key=lambda one: -one[2])[:MOST_STEPS])

@@ -2,12 +2,15 @@
 
 ȳ = 1·w̄ + b + n̄ in each block. Where the board may move w̄ is unknown: what is left is the parity, the differences
 between gyros, with the weight matrix G = R⁻¹ - R⁻¹11'R⁻¹/(1'R⁻¹1), G1 = 0. Where it stands still for certain (anchors)
-w̄ = 0 and G = R⁻¹. b = initial bias + temperature slope × (T - T̄) + random walk; the first two are constants.
+w̄ = 0 and G = R⁻¹. b = constant + step after a fault + temperature slope × (T - T̄) + random walk, which may fade.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +20,7 @@ from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filters
 
 FREEDOM = 2.0
-"""Degrees of freedom ν of the initial biases' Student distribution. Above N - 2 one gyro however far off is believed
+"""Degrees of freedom ν of the biases' Student distribution. Above N - 2 one gyro however far off is believed
 as much as the rest: its likelihood falls by d^-(ν+1), that of N - 1 wider biases by d^-(N-1)."""
 STEPS, SETTLED = 500, 1e-9
 LEAST = 1.0
@@ -25,20 +28,43 @@ LEAST = 1.0
 
 
 @dataclass(frozen=True)
+class Walk:
+    """Random walks of the biases.
+
+    rrw : K [N], deg/s/√s
+    tau_s : time in which they fade, s: Gauss-Markov processes of the s.d. K·√(τ/2) about a constant; infinite: never
+    gain : 2Δ log likelihood of them over those given, less what other ratios cost
+    how  : as given; all of one size or multiplied by one number; each by its own
+    """
+
+    rrw: np.ndarray
+    tau_s: float = math.inf
+    gain: float = 0.0
+    how: Literal["given", "together", "each"] = "given"
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers were chosen."""
+        return {"given": 0, "together": 1, "each": len(self.rrw)}[self.how] + math.isfinite(self.tau_s)
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Block means of N gyros and what they weigh.
 
-    means  : [B, N], deg/s, less their mean where the board may move;  weight : G [B, N, N]
-    time   : [B] s;  jump : [B, N], variance by which a bias may have changed just before
-    temperature : [B], K, about its mean; None: no regressors of it
+    means  : [B, N], deg/s, less their mean where the board may move;  weight : G [B, N, N];  time : [B] s
+    design : D [B, N, k] of the constants: the N biases, E steps after faults, and the N temperature slopes if any
+    steps  : [E], (deg/s)², variances of the steps beforehand
+    walks  : correlation [N, N] of the random walks
     anchored : standstill makes the common part seen in some of the blocks
     """
 
     means: np.ndarray
     weight: np.ndarray
     time: np.ndarray
-    jump: np.ndarray
-    temperature: np.ndarray | None
+    design: np.ndarray
+    steps: np.ndarray
+    walks: np.ndarray
     anchored: bool
 
     @classmethod
@@ -55,6 +81,7 @@ class Evidence:
 
         variance    : [B, N], (deg/s)² of a sample; not finite or not above 0: the gyro says nothing in this block
         correlation : [N, N] of the noise;  resting : [B] of bool, the board stands still for certain
+        temperature : [B], K, about its mean; None: no slopes
         """
         used = np.isfinite(variance) & (variance > 0) & ~blocks.at_fault(array)
         weight = _inverse_covariance(used, variance / blocks.length[:, None], correlation)
@@ -65,50 +92,75 @@ class Evidence:
         means = np.stack([blocks.mean(column) for column in array.rate.T], axis=1)
         # G1 = 0: a rate that all share is taken out first, so that not even its rounding is left.
         means[~resting] -= means[~resting].mean(axis=1)[:, None]
-        return cls(means, weight, blocks.time, blocks.jumps(array), temperature, bool(resting.any()))
+        steps = blocks.steps(array)
+        design = _design(len(blocks), means.shape[1], steps, temperature)
+        sizes = np.array([size**2 for _, _, size in steps])
+        return cls(means, weight, blocks.time, design, sizes, array.noise.correlation, bool(resting.any()))
+
+    @property
+    def gyros(self) -> int:
+        """N."""
+        return self.means.shape[1]
+
+    @property
+    def plain(self) -> int:
+        """Constants without the temperature slopes, N + E."""
+        return self.gyros + len(self.steps)
+
+    @property
+    def has_slopes(self) -> bool:
+        """Temperature slopes are among the constants."""
+        return self.design.shape[2] > self.plain
 
     def part(self, kept: np.ndarray) -> Evidence:
         """Some of the blocks, by their numbers, increasing: the others are as if they had not been measured."""
-        temperature = None if self.temperature is None else self.temperature[kept]
-        # The jumps since the one before it; those before the first are part of the initial bias.
-        total = np.cumsum(self.jump, axis=0)[kept]
-        jump = np.diff(total, axis=0, prepend=total[:1])
-        return Evidence(self.means[kept], self.weight[kept], self.time[kept], jump, temperature, self.anchored)
+        chosen = {name: getattr(self, name)[kept] for name in ("means", "weight", "time", "design")}
+        return replace(self, **chosen)
 
     def information(self) -> Information:
-        """For the filter; the regressors are the N initial biases, then the N temperature slopes."""
-        known = self.weight @ self.means[..., None]
-        scales = [np.ones(len(self.time))]
-        if self.temperature is not None:
-            scales.append(self.temperature)
-        vector = np.concatenate([known, *(self.weight * one[:, None, None] for one in scales)], axis=2)
-        measured = np.tensordot(self.means, vector, axes=([0, 1], [0, 1]))
-        # D = [I, T·I]
-        total = np.vstack([measured[None], *(np.einsum("b,bnk->nk", scale, vector) for scale in scales)])
-        return Information(self.weight, vector, total, np.diff(self.time, prepend=self.time[:1]), self.jump)
+        """For the filter."""
+        columns = np.concatenate([self.means[..., None], self.design], axis=2)
+        vector = self.weight @ columns
+        total = np.tensordot(columns, vector, axes=([0, 1], [0, 1]))
+        return Information(self.weight, vector, total, np.diff(self.time, prepend=self.time[:1]))
 
-    def filtered(self, information: Information, walk: np.ndarray) -> Filtered:
-        """The filter's forward pass with one walk [N, N]."""
-        return self.filtered_with(information, walk[None])[0]
+    def filtered(self, information: Information, walk: Walk) -> Filtered:
+        """The filter's forward pass with one walk."""
+        return self.filtered_with(information, [walk])[0]
 
-    def filtered_with(self, information: Information, walks: np.ndarray) -> list[Filtered]:
-        """The filter's forward pass with each of several walks [S, N, N].
+    def filtered_with(self, information: Information, walks: Sequence[Walk]) -> list[Filtered]:
+        """The filter's forward pass with each of several walks.
 
         What rounding takes for information on the constants, or against it, is taken out: without anchors their common
         parts are not seen at all, and nowhere is there less than none.
         """
-        return [self._cleared(filtered) for filtered in run_filters(information, walks)]
+        steps = np.stack([np.outer(one.rrw, one.rrw) * self.walks for one in walks])
+        taus = np.array([one.tau_s for one in walks])
+        return [self._cleared(filtered) for filtered in run_filters(information, steps, taus)]
 
     def _cleared(self, filtered: Filtered) -> Filtered:
-        gyros = self.means.shape[1]
         squares = filtered.squares.copy()
-        for start in range(1, len(squares), gyros) if not self.anchored else ():
-            rows = slice(start, start + gyros)
-            squares[rows] -= squares[rows].mean(axis=0)
-            squares[:, rows] -= squares[:, rows].mean(axis=1)[:, None]
+        for start in () if self.anchored else (1, 1 + self.plain):
+            rows = slice(start, start + self.gyros)
+            if start < len(squares):
+                squares[rows] -= squares[rows].mean(axis=0)
+                squares[:, rows] -= squares[:, rows].mean(axis=1)[:, None]
         values, vectors = np.linalg.eigh((squares[1:, 1:] + squares[1:, 1:].T) / 2)
         squares[1:, 1:] = (vectors * np.maximum(values, 0.0)) @ vectors.T
         return replace(filtered, squares=squares)
+
+
+def _design(blocks: int, gyros: int, steps: list[tuple[int, int, float]], temperature: np.ndarray | None) -> np.ndarray:
+    """Regressors [B, N, k] of the biases' constants."""
+    slopes = 0 if temperature is None else gyros
+    design = np.zeros((blocks, gyros, gyros + len(steps) + slopes))
+    each = np.arange(gyros)
+    design[:, each, each] = 1.0
+    for number, (back, gyro, _) in enumerate(steps):
+        design[back:, gyro, gyros + number] = 1.0
+    if temperature is not None:
+        design[:, each, gyros + len(steps) + each] = temperature[:, None]
+    return design
 
 
 def _inverse_covariance(used: np.ndarray, variance: np.ndarray, correlation: np.ndarray) -> np.ndarray:
@@ -128,15 +180,9 @@ def _inverse_covariance(used: np.ndarray, variance: np.ndarray, correlation: np.
     return inverse * (scale[:, :, None] * scale[:, None, :])
 
 
-def walk_covariance(rrw: np.ndarray, correlation: np.ndarray) -> np.ndarray:
-    """Covariance of the random walks K_i·K_j·corr_ij [N, N], (deg/s)²/s; a K that is not known is 0."""
-    known = np.where(np.isfinite(rrw), rrw, 0.0)
-    return np.outer(known, known) * correlation
-
-
 @dataclass(frozen=True)
 class Constants:
-    """Posterior of the constants β: initial biases [N], deg/s, then temperature slopes [N], deg/s/K.
+    """Posterior of the constants β: biases [N] and steps [E], deg/s, then temperature slopes [N], deg/s/K.
 
     mean [k], covariance [k, k];  prior [k], variances beforehand, of mean 0
     """
@@ -166,7 +212,7 @@ def log_likelihood(filtered: Filtered, prior: np.ndarray) -> float:
 
 
 def log_likelihood_slope(
-    blocks: Information, filtered: Filtered, prior: np.ndarray, rrw: np.ndarray, correlation: np.ndarray
+    evidence: Evidence, blocks: Information, filtered: Filtered, prior: np.ndarray, rrw: np.ndarray
 ) -> np.ndarray:
     """Derivatives [N] of log_likelihood by log K_i, exactly.
 
@@ -174,20 +220,22 @@ def log_likelihood_slope(
     Koopman & Shephard (1992), Biometrika 79, 823-826.
     """
     score, weight = run_back(blocks, filtered)
-    found = posterior(filtered, prior)
+    found, grown = posterior(filtered, prior), filtered.grown
     left = score[..., 0] - score[..., 1:] @ found.mean
-    gap = blocks.gap
-    across = np.einsum("b,bik,bjl->ikjl", gap, score[..., 1:], score[..., 1:], optimize=True)
-    excess = (gap[:, None] * left).T @ left + np.einsum("ikjl,kl->ij", across, found.covariance)
-    excess -= np.tensordot(gap, weight, axes=1)
-    return rrw * ((excess * correlation) @ rrw)
+    values, vectors = np.linalg.eigh(found.covariance)
+    spread = score[..., 1:] @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    both = np.concatenate([left[..., None], spread], axis=2)
+    excess = np.tensordot(grown[:, None, None] * both, both, axes=([0, 2], [0, 2])) - np.tensordot(
+        grown, weight, axes=1
+    )
+    return rrw * ((excess * evidence.walks) @ rrw)
 
 
-def empirical_prior(filtered: Filtered, gyros: int) -> np.ndarray:
+def empirical_prior(evidence: Evidence, filtered: Filtered) -> np.ndarray:
     """Variances [k] of the constants beforehand, from their own spread: empirical Bayes.
 
-    Initial biases: independent Student variables about 0 with ν degrees of freedom, as normal ones of the variance
-    s²/λ_i: λ_i = (ν + 1)/(ν + E b_i²/s²), s² = mean λ_i·E b_i², again and again (an EM algorithm; E b_i² is that of the
+    Biases: independent Student variables about 0 with ν degrees of freedom, as normal ones of the variance s²/λ_i:
+    λ_i = (ν + 1)/(ν + E b_i²/s²), s² = mean λ_i·E b_i², again and again (an EM algorithm; E b_i² is that of the
     posterior). What all share goes to the motion where nothing anchors it, so they are about their robust centre,
     whose variance is 1/Σ(λ_i/s²). That is too small, for the information of a Student location is (ν + 1)/(ν + 3) of
     that of its weights, and for s is known from N - 1 differences alone: the variances are enlarged by the inverse of
@@ -198,22 +246,28 @@ def empirical_prior(filtered: Filtered, gyros: int) -> np.ndarray:
     """
     from scipy.stats import norm, t
 
-    constants = len(filtered.squares) - 1
+    gyros = evidence.gyros
     seen = np.diag(filtered.squares)[1:]
+    slopes = len(seen) > evidence.plain
+    groups = [slice(0, gyros), slice(evidence.plain, None)][: 1 + slopes]
     # Begins wide: the squared estimate of each alone, or what one measurement of all would leave open.
-    alone = (filtered.squares[1:, 0] ** 2 / np.where(seen > 0, seen, 1.0) ** 2).reshape(-1, gyros)
-    open_variance = (1.0 / np.where(seen > 0, seen, 1.0)).reshape(-1, gyros)
-    size = np.maximum(alone, open_variance).mean(axis=1)
-    least = LEAST * open_variance.mean(axis=1)
-    share = np.ones((constants // gyros, gyros))
+    open_variance = 1.0 / np.where(seen > 0, seen, 1.0)
+    alone = np.maximum((filtered.squares[1:, 0] * open_variance) ** 2, open_variance)
+    size = np.array([alone[group].mean() for group in groups])
+    least = LEAST * np.array([open_variance[group].mean() for group in groups])
+    share = np.ones((len(groups), gyros))
+
+    def prior(enlarged: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
+        sizes = size[:, None] / share * np.array(enlarged)[: len(groups), None]
+        return np.concatenate([sizes[0], evidence.steps, *sizes[1:]])
+
     for _ in range(STEPS):
-        found = posterior(filtered, (size[:, None] / share).ravel())
-        second = (found.mean**2 + np.diag(found.covariance)).reshape(-1, gyros)
+        found = posterior(filtered, prior())
+        second = found.mean**2 + np.diag(found.covariance)
+        second = np.stack([second[group] for group in groups])
         share[0] = (FREEDOM + 1) / (FREEDOM + second[0] / size[0])
         before, size = size, np.maximum((share * second).mean(axis=1), least)
         if np.all(np.abs(size - before) <= SETTLED * before):
             break
     few = float(t.ppf(0.975, max(gyros - 1, 1)) / norm.ppf(0.975)) ** 2
-    prior = few * size[:, None] / share
-    prior[0] *= (FREEDOM + 3) / (FREEDOM + 1)
-    return prior.ravel()
+    return prior((few * (FREEDOM + 3) / (FREEDOM + 1), few))

@@ -16,7 +16,8 @@ def frequency_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """z = u'(y - b̂), u = R⁻¹1/(1'R⁻¹1): white noise of the ARW, biases b that walk, b̂ two-sided from the parity.
 
     In the middle of a long recording the gain of gyro i is weights_at(f)_i: near u where white noise prevails, near the
-    weights of the walks below that; a rate that all share passes as it is. The walks' K are scaled by the likelihood.
+    weights of the walks below that; a rate that all share passes as it is. K is that of the walks that the likelihood
+    chooses; where they fade S_i(f) levels off below 1/(2πτ). Steps, temperature and anchors as in slow_errors.
     raises : CannotRun where an ARW is missing or the correlation is not positive definite
     """
     noise = array.noise.with_arw(parameters.arw)

@@ -1,9 +1,10 @@
 """Kalman filter and two-sided smoother of random walks, in information form, with constants that are regressed on.
 
-State b [N], b_t = b_{t-1} + noise of covariance Q_t, b = 0 before the first step. A block of measurements is its
-information: y has the weight matrix G (singular where a part of b cannot be seen), and only G, Gy and y'Gy matter. The
-columns of y are the measurement itself and k regressors, so that one run serves for every value of their coefficients
-β: what is left of y is y_0 - Σ β_j·y_j, and the filter is linear.
+State b [N], b_t = φ_t·b_{t-1} + noise of covariance q_t·walk: a random walk, φ = 1 and q = Δt, that begins at 0, or one
+that fades with the time τ (Gauss-Markov), φ = e^(-Δt/τ) and q = τ/2·(1 - φ²), that begins anywhere, with τ/2·walk.
+A block of measurements is its information: y has the weight matrix G (singular where a part of b cannot be seen), and
+only G, Gy and y'Gy matter. The columns of y are the measurement itself and k regressors, so that one run serves for
+every value of their coefficients β: what is left of y is y_0 - Σ β_j·y_j, and the filter is linear.
 """
 
 from __future__ import annotations
@@ -19,27 +20,25 @@ class Information:
 
     matrix : G [B, N, N], inverse covariance of each block's measurement
     vector : G·y [B, N, 1 + k], of the measurement and of the k regressors
-    total  : Σ y'Gy [1 + k, 1 + k]
-    gap    : [B] s, time since the block before;  jump : [B, N], variance added to the walk of each state just before
+    total  : Σ y'Gy [1 + k, 1 + k];  gap : [B] s, time since the block before, 0 for the first
     """
 
     matrix: np.ndarray
     vector: np.ndarray
     total: np.ndarray
     gap: np.ndarray
-    jump: np.ndarray
 
     def merged(self, first: np.ndarray) -> Information:
         """Several blocks as one, as if the states stood still within; first [M], first block of each."""
         time = np.cumsum(self.gap)
         middle = np.add.reduceat(time, first) / np.diff(first, append=len(time))
-        matrix, vector, jump = (np.add.reduceat(one, first, axis=0) for one in (self.matrix, self.vector, self.jump))
-        return Information(matrix, vector, self.total, np.diff(middle, prepend=middle[:1]), jump)
+        matrix, vector = (np.add.reduceat(one, first, axis=0) for one in (self.matrix, self.vector))
+        return Information(matrix, vector, self.total, np.diff(middle, prepend=middle[:1]))
 
     def first_regressors(self, count: int) -> Information:
         """With the first `count` regressors alone."""
         kept = slice(1 + count)
-        return Information(self.matrix, self.vector[..., kept], self.total[kept, kept], self.gap, self.jump)
+        return Information(self.matrix, self.vector[..., kept], self.total[kept, kept], self.gap)
 
 
 @dataclass(frozen=True)
@@ -47,12 +46,15 @@ class Filtered:
     """One-sided estimates, before each block's own measurement.
 
     state : [B, N, 1 + k], of each column;  covariance : P [B, N, N];  keep : L = (I + P·G)⁻¹ [B, N, N]
+    fade  : φ [B];  grown : q [B], that of the first block what the state begins with
     squares : Σ e'We [1 + k, 1 + k] of the innovations e;  log_det : Σ log det(I + P·G)
     """
 
     state: np.ndarray
     covariance: np.ndarray
     keep: np.ndarray
+    fade: np.ndarray
+    grown: np.ndarray
     squares: np.ndarray
     log_det: float
 
@@ -62,34 +64,50 @@ class Filtered:
         return replace(self, state=self.state[..., kept], squares=self.squares[kept, kept])
 
 
-def run_filters(blocks: Information, walks: np.ndarray) -> list[Filtered]:
-    """Forward pass with each of several walks: P ← P + Q, L = (I + PG)⁻¹, P ← LP, x ← Lx + P·Gy.
+def run_filters(blocks: Information, walks: np.ndarray, taus: np.ndarray) -> list[Filtered]:
+    """Forward pass with each of several walks: P ← φ²P + Q, x ← φx;  L = (I + PG)⁻¹, P ← LP, x ← Lx + P·Gy.
 
-    blocks  : B blocks of measurements;  walks [S, N, N], (deg/s)²/s: Q_t = walk·gap_t + diag(jump_t)
+    blocks : B blocks of measurements;  walks [S, N, N], (deg/s)²/s;  taus [S] s, in which they fade, or infinite
     The covariance form of the update with G singular: Bayard & Ploen, US 2003/0187623, where G is that of the parity.
     """
     number, states, columns = blocks.vector.shape
     many = len(walks)
+    fade, grown = _steps(blocks.gap, taus)
     state, covariance = np.empty((number, many, states, columns)), np.empty((number, many, states, states))
     keep, one = np.empty((number, many, states, states)), np.eye(states)
     x, P = np.zeros((many, states, columns)), np.zeros((many, states, states))
-    jumps = set(np.flatnonzero(blocks.jump.any(axis=1)).tolist())
-    for index, gap in enumerate(blocks.gap.tolist()):
-        P = P + gap * walks
-        if index in jumps:
-            P = P + np.diag(blocks.jump[index])
+    for index in range(number):
+        still = fade[index]
+        x, P = still * x, still * still * P + grown[index] * walks
         state[index], covariance[index] = x, P
         L = np.linalg.inv(one + P @ blocks.matrix[index])
         keep[index] = L
         P = L @ P
         P = (P + P.transpose(0, 2, 1)) * 0.5
         x = L @ x + P @ blocks.vector[index]
-    return [_filtered(blocks, *(part[:, index] for part in (state, covariance, keep))) for index in range(many)]
+    parts = (state, covariance, keep, fade[..., 0, 0], grown[..., 0, 0])
+    return [_filtered(blocks, *(part[:, index] for part in parts)) for index in range(many)]
 
 
-def _filtered(blocks: Information, state: np.ndarray, covariance: np.ndarray, keep: np.ndarray) -> Filtered:
+def _steps(gap: np.ndarray, taus: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """φ and q of each block [B, S, 1, 1]."""
+    fading = np.isfinite(taus)
+    shares = gap[:, None] / taus
+    grown = np.where(fading, np.where(fading, taus, 1.0) / 2.0 * -np.expm1(-2.0 * shares), gap[:, None])
+    grown[0] = np.where(fading, taus, 0.0) / 2.0
+    return np.exp(-shares)[..., None, None], grown[..., None, None]
+
+
+def _filtered(
+    blocks: Information,
+    state: np.ndarray,
+    covariance: np.ndarray,
+    keep: np.ndarray,
+    fade: np.ndarray,
+    grown: np.ndarray,
+) -> Filtered:
     squares = blocks.total - _fitted(blocks, state, keep @ covariance)
-    return Filtered(state, covariance, keep, squares, -float(np.linalg.slogdet(keep)[1].sum()))
+    return Filtered(state, covariance, keep, fade, grown, squares, -float(np.linalg.slogdet(keep)[1].sum()))
 
 
 def _fitted(blocks: Information, state: np.ndarray, updated: np.ndarray) -> np.ndarray:
@@ -115,11 +133,12 @@ def run_back(blocks: Information, filtered: Filtered) -> tuple[np.ndarray, np.nd
     score = turned @ (blocks.vector - blocks.matrix @ filtered.state)
     weight = turned @ blocks.matrix
     r, curvature = np.zeros_like(score[0]), np.zeros_like(weight[0])
-    for index in range(len(score) - 1, -1, -1):
+    for index, still in zip(range(len(score) - 1, -1, -1), filtered.fade[::-1].tolist(), strict=True):
         back = turned[index]
         r = score[index] + back @ r
         curvature = weight[index] + back @ curvature @ keep[index]
         score[index], weight[index] = r, curvature
+        r, curvature = still * r, still * still * curvature
     return score, weight
 
 
