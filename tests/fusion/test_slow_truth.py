@@ -202,6 +202,31 @@ def test_temperature_slopes_are_found(simulated):
     assert 0.17 < np.mean(np.square(common)) < 2.7
 
 
+def test_shared_slope_at_rest_as_a_whole(simulated):
+    # Expected: the mean of the true slopes, within its s.d. (mean square of 8 values: chi², 0.17 to 2.7 at 99 %), for a
+    # rate that is one constant of any size, and that constant is left in the result.
+    temperature = 30.0 + 6.0 * (1 - np.exp(-np.arange(600) / 150.0))
+    slopes = np.array([0.03, -0.02, 0.01, 0.05, -0.04, 0.02])
+    errors = []
+    for seed in SEEDS:
+        array, _ = simulated(
+            600, seed, spread=0.02, at_rest=np.ones(600, dtype=bool), temperature=temperature, slopes=slopes
+        )
+        walk = Walk(RRW)
+        found = slow_errors(array, FilterParameters(), ARW**2, walk=walk)
+        errors.append(
+            (found.temperature.slope - slopes) @ EQUAL / np.sqrt(EQUAL @ found.temperature.covariance @ EQUAL)
+        )
+        moved = replace(array, rate=array.rate + 7.0)
+        again = slow_errors(moved, FilterParameters(), ARW**2, walk=walk)
+        difference = combined_without(moved, EQUAL, again) - combined_without(array, EQUAL, found)
+        np.testing.assert_allclose(difference, 7.0, atol=1e-9)
+        # In motion nothing says so: the s.d. is larger by far.
+        turning = slow_errors(replace(array, at_rest=~array.at_rest), MOVING, ARW**2, walk=walk)
+        assert EQUAL @ turning.temperature.covariance @ EQUAL > 4 * EQUAL @ found.temperature.covariance @ EQUAL
+    assert 0.17 < np.mean(np.square(errors)) < 2.7
+
+
 @pytest.mark.full
 def test_drift_is_not_taken_for_temperature(simulated):
     # Expected: no slopes, for there are none, though the temperature drifts as the biases do. K is not known well.

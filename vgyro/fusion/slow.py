@@ -16,7 +16,7 @@ from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_choice import Choice, choose
-from vgyro.fusion.slow_model import Constants, Evidence, Walk, empirical_prior, posterior
+from vgyro.fusion.slow_model import Constants, Evidence, Walk, empirical_prior, posterior, with_shared_slope
 from vgyro.fusion.slow_smoother import run_smoother
 from vgyro.units import rrw_deg_h_rt_h
 
@@ -31,7 +31,7 @@ Weights = np.ndarray | SampleWeights
 class Temperature:
     """Temperature coefficients of the biases.
 
-    slope [N], deg/s/K, covariance [N, N]: what all gyros share in is known from standstill alone
+    slope [N], deg/s/K, covariance [N, N]: what all gyros share is known from standstill alone
     reference : temperature at which they are zero, °C
     """
 
@@ -86,7 +86,8 @@ def slow_errors(
     returns     : SlowErrors
     raises      : DataError where the correlation is not positive definite, or the variance does not fit
     Model: vgyro.fusion.slow_model; with the noise of the walks K_i·K_j·corr_ij, that of Bayard & Ploen
-    (US 2003/0187623), smoothed. Walks that fade stand for flicker. Gyros at fault are left out of the blocks they touch.
+    (US 2003/0187623), smoothed. Walks that fade stand for flicker. Gyros at fault are left out of their blocks.
+    At rest as a whole the rate is one constant, whose size is not known: what all gyros follow the temperature is seen.
     """
     blocks = SlowBlocks.of(array) if blocks is None else blocks
     gyros = array.rate.shape[1]
@@ -104,12 +105,16 @@ def slow_errors(
     choice = choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk)
     constants = posterior(choice.filtered, empirical_prior(evidence, choice.filtered))
     state, covariance = run_smoother(choice.information, choice.filtered)
+    constant_rate = choice.slopes and bool(array.at_rest.all())
+    if constant_rate:
+        so_far, _ = _with_constants(state, covariance, constants, evidence.design)
+        constants = with_shared_slope(evidence, choice.walk, so_far, constants)
     bias, covariance = _with_constants(state, covariance, constants, evidence.design)
     slopes = slice(evidence.plain, None)
     warming = (
         Temperature(constants.mean[slopes], constants.covariance[slopes, slopes], centre) if choice.slopes else None
     )
-    parts = (why, why_not, _of_walk(array, choice.walk), _of_temperature(choice, evidence.anchored))
+    parts = (why, why_not, _of_walk(array, choice.walk), _of_temperature(choice, evidence.anchored, constant_rate))
     note = "; ".join(filter(None, parts))
     return SlowErrors(blocks, bias, covariance, evidence.anchored, warming, choice.walk, constants, note)
 
@@ -174,14 +179,18 @@ def _of_walk(array: ArrayRates, walk: Walk) -> str:
     return f"K = {sizes} deg/h/√h{fading}, by likelihood (2Δ log L = {walk.gain:.1f})"
 
 
-def _of_temperature(choice: Choice, anchored: bool) -> str:
+def _of_temperature(choice: Choice, anchored: bool, constant_rate: bool) -> str:
     if not np.isfinite(choice.slopes_gain):
         return ""
     compared = f"2Δ log L = {choice.slopes_gain:.1f}, {choice.needed:.1f} needed"
     if not choice.slopes:
         return f"not regressed on the temperature ({compared})"
-    seen = "and standstill shows their common part" if anchored else "their common part is not seen"
-    return f"regressed on the temperature ({compared}): differences of the slopes between gyros, {seen}"
+    seen = "their common part is not"
+    if anchored or constant_rate:
+        seen = (
+            "standstill shows their common part" if anchored else "a rate that is one constant shows their common part"
+        )
+    return f"regressed on the temperature ({compared}): differences of the slopes between gyros are seen; {seen}"
 
 
 def combined_without(array: ArrayRates, weights: Weights, slow: SlowErrors) -> np.ndarray:

@@ -52,7 +52,8 @@ class Walk:
 class Evidence:
     """Block means of N gyros and what they weigh.
 
-    means  : [B, N], deg/s, less their mean where the board may move;  weight : G [B, N, N];  time : [B] s
+    means  : [B, N], deg/s, less `shared` [B], their mean where the board may move
+    weight : G [B, N, N];  total : R⁻¹1 [B, N];  time : [B] s
     design : D [B, N, k] of the constants: the N biases, E steps after faults, and the N temperature slopes if any
     steps  : [E], (deg/s)², variances of the steps beforehand
     walks  : correlation [N, N] of the random walks
@@ -60,7 +61,9 @@ class Evidence:
     """
 
     means: np.ndarray
+    shared: np.ndarray
     weight: np.ndarray
+    total: np.ndarray
     time: np.ndarray
     design: np.ndarray
     steps: np.ndarray
@@ -91,11 +94,14 @@ class Evidence:
         weight[~resting & ~parity] = 0.0
         means = np.stack([blocks.mean(column) for column in array.rate.T], axis=1)
         # G1 = 0: a rate that all share is taken out first, so that not even its rounding is left.
-        means[~resting] -= means[~resting].mean(axis=1)[:, None]
+        shared = np.where(resting, 0.0, means.mean(axis=1))
+        means -= shared[:, None]
         steps = blocks.steps(array)
         design = _design(len(blocks), means.shape[1], steps, temperature)
         sizes = np.array([size**2 for _, _, size in steps])
-        return cls(means, weight, blocks.time, design, sizes, array.noise.correlation, bool(resting.any()))
+        return cls(
+            means, shared, weight, total, blocks.time, design, sizes, array.noise.correlation, bool(resting.any())
+        )
 
     @property
     def gyros(self) -> int:
@@ -114,7 +120,7 @@ class Evidence:
 
     def part(self, kept: np.ndarray) -> Evidence:
         """Some of the blocks, by their numbers, increasing: the others are as if they had not been measured."""
-        chosen = {name: getattr(self, name)[kept] for name in ("means", "weight", "time", "design")}
+        chosen = {name: getattr(self, name)[kept] for name in ("means", "shared", "weight", "total", "time", "design")}
         return replace(self, **chosen)
 
     def information(self) -> Information:
@@ -271,3 +277,32 @@ def empirical_prior(evidence: Evidence, filtered: Filtered) -> np.ndarray:
             break
     few = float(t.ppf(0.975, max(gyros - 1, 1)) / norm.ppf(0.975)) ** 2
     return prior((few * (FREEDOM + 3) / (FREEDOM + 1), few))
+
+
+def with_shared_slope(evidence: Evidence, walk: Walk, bias: np.ndarray, constants: Constants) -> Constants:
+    """The constants with what a rate that is one constant throughout says of the temperature slope that all share.
+
+    bias : b̂ [B, N] so far. What is left of the rate, z = u'(y - b̂) with u = R⁻¹1/(1'R⁻¹1), is regressed on a constant
+    and on the temperature, with the white noise of z and a walk of the variance u'Qu, which is that of alike gyros; its
+    slope is one more measurement of u'γ.
+    """
+    D = evidence.total.sum(axis=1)
+    u = evidence.total / np.where(D > 0, D, 1.0)[:, None]
+    temperature = evidence.design[:, 0, evidence.plain]
+    z = np.sum(u * (evidence.means - bias), axis=1) + evidence.shared
+    columns = np.stack([z - z.mean(), np.ones(len(z)), temperature], axis=1)[:, None, :]
+    vector = D[:, None, None] * columns
+    gap = np.diff(evidence.time, prepend=evidence.time[:1])
+    left = Information(D[:, None, None], vector, np.tensordot(columns, vector, axes=([0, 1], [0, 1])), gap)
+    mean = u.mean(axis=0)
+    walks = (mean * walk.rrw) @ evidence.walks @ (mean * walk.rrw)
+    squares = run_filters(left, np.array([[[walks]]]), np.array([walk.tau_s]))[0].squares
+    # The constant is not known at all.
+    seen = squares[2, 2] - squares[1, 2] ** 2 / squares[1, 1]
+    score = squares[2, 0] - squares[1, 0] * squares[1, 2] / squares[1, 1]
+    along = np.zeros(len(constants.mean))
+    along[evidence.plain :] = mean
+    known = constants.covariance @ along
+    gain = known / (along @ known + 1.0 / seen)
+    covariance = constants.covariance - np.outer(gain, known)
+    return Constants(constants.mean + gain * (score / seen), covariance, constants.prior)
