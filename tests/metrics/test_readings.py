@@ -69,6 +69,16 @@ def test_bias_drift_is_the_minimum():
     assert drift.value == pytest.approx(3600 * math.sqrt(2 * N * K / math.sqrt(3)), rel=0.01)
     assert tau.value == pytest.approx(math.sqrt(3) * N / K, rel=0.15)
     assert drift.note == ""
+    # What a smoother lowers does not count: neither as the floor nor as the foot of the line.
+    smoothed = curve_of(lambda tau: np.sqrt(N**2 / tau + K**2 * tau / 3) * np.minimum(tau / 0.5, 1) ** 6)
+    assert bias_drift(smoothed)[1].value < 0.5
+    assert bias_drift(smoothed, 1e9)[1].value == smoothed.tau[-1]
+    assert math.isnan(rrw_read(smoothed, 1e9).value)
+    drift_after, tau_after = bias_drift(smoothed, 0.5)
+    assert (drift_after.value, tau_after.value) == (drift.value, tau.value)
+    assert rrw_read(smoothed, 0.5).value == pytest.approx(
+        rrw_read(curve_of(lambda tau: np.sqrt(N**2 / tau + K**2 * tau / 3))).value
+    )
     falling, _ = bias_drift(curve_of(lambda tau: N / np.sqrt(tau)))
     assert "still falls" in falling.note
 

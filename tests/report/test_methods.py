@@ -142,7 +142,7 @@ def test_what_a_method_costs_and_needs_and_what_was_inferred(dataset: DatasetPar
     assert ">1200<" in row
     assert "counted from the equations: 1234" in row
     assert ">causal<" in row
-    assert ">volatility weights<" in row
+    assert ">H_t<" in row
     assert "inferred: one of &lt;two&gt; equations" in html
     offline = re.search(r">Recommended<.*?</tr>", html, re.S).group(0)
     assert ">offline<" in offline

@@ -90,7 +90,7 @@ def noise_coefficients(
     if curve.kind not in FITTED_KINDS:
         raise ValueError(f"no coefficients of a {curve.kind} deviation: its terms have other shapes")
     low_pass = LowPass(bandwidth_hz, dc_gain, passes)
-    shortest = 1 / (math.pi * bandwidth_hz) if bandwidth_hz else 0.0
+    shortest = low_pass.shortest_tau
     used = np.isfinite(curve.deviation) & (curve.edf > 0) & (curve.tau >= shortest)
     if used.sum() < len(BASE):
         note = "fewer than 3 points of the Allan curve"

@@ -39,6 +39,11 @@ class LowPass:
         return self.bandwidth_hz is not None and self.passes == 0
 
     @property
+    def shortest_tau(self) -> float:
+        """τ below which the Allan curve is the low-pass's own and not the noise's, s: 2Tc of one pass; 0: none is."""
+        return 0.0 if self.bandwidth_hz is None else 1 / (math.pi * self.bandwidth_hz)
+
+    @property
     def both_ways(self) -> bool:
         """Did a first-order low-pass run over it forward and back?"""
         return self.bandwidth_hz is not None and self.passes == 2

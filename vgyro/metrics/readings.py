@@ -45,7 +45,7 @@ def paper_readings(
     low_pass = LowPass(bandwidth_hz, dc_gain, passes)
     notes = [SMOOTHER if low_pass.other_shape else "", coefficients.note]
     density = noise_density(spectrum, flat_band(rate_hz, bandwidth_hz), curve.confidence)
-    drift, drift_tau = bias_drift(curve)
+    drift, drift_tau = bias_drift(curve, low_pass.shortest_tau)
     level = Reading(density.value, density.low, density.high, _density_note(density.value, density.band))
     return {
         "noise_density": level,
@@ -53,7 +53,7 @@ def paper_readings(
         "arw": _fitted(coefficients.N, units.arw_deg_rt_h, "; ".join(filter(None, notes))),
         "density_ratio": density_ratio(level, coefficients.N, curve.confidence, dc_gain),
         "quantisation": _fitted(coefficients.Q, float, coefficients.note),
-        "rrw_read": rrw_read(curve),
+        "rrw_read": rrw_read(curve, low_pass.shortest_tau),
         "rrw": _fitted(coefficients.K, units.rrw_deg_h_rt_h, coefficients.note),
         "rate_ramp": _fitted(coefficients.R, units.ramp_deg_h2, coefficients.note),
         "bias_drift": drift,
@@ -106,16 +106,25 @@ def counted(number: int) -> Reading:
     return Reading(float(number), math.nan, math.nan)
 
 
-def lowest_point(curve: AllanCurve) -> int:
-    """Index of the lowest point of a curve that has a degree of freedom."""
-    usable = curve.edf >= FEWEST_FREEDOM
-    return int(np.argmin(np.where(usable, curve.deviation, np.inf))) if usable.any() else 0
+def lowest_point(curve: AllanCurve, shortest: float = 0.0) -> int:
+    """Index of the lowest point of a curve that has a degree of freedom, from τ = `shortest` s on.
+
+    A smoothed rate hardly changes from sample to sample: below that τ the curve is low whatever the noise is.
+    """
+    free = curve.edf >= FEWEST_FREEDOM
+    usable = free & (curve.tau >= shortest)
+    if not usable.any():
+        return int(np.flatnonzero(free).max(initial=0))
+    return int(np.argmin(np.where(usable, curve.deviation, np.inf)))
 
 
-def bias_drift(curve: AllanCurve) -> tuple[Reading, Reading]:
-    """Lowest point of the curve, deg/h, and its τ, s; limits are those of the curve at that τ."""
+def bias_drift(curve: AllanCurve, shortest: float = 0.0) -> tuple[Reading, Reading]:
+    """Lowest point of the curve, deg/h, and its τ, s; limits are those of the curve at that τ.
+
+    shortest : τ from which on it is looked for, s: a low-pass lowers the curve below
+    """
     usable = curve.edf >= FEWEST_FREEDOM
-    index = lowest_point(curve)
+    index = lowest_point(curve, shortest)
     falls = index == len(curve.tau) - 1 or not usable[index + 1 :].any()
     note = "the curve still falls at its end: an upper limit of the floor" if falls else ""
     low, value, high = (float(units.deg_h(row[index])) for row in (curve.low, curve.deviation, curve.high))
@@ -123,16 +132,19 @@ def bias_drift(curve: AllanCurve) -> tuple[Reading, Reading]:
     return Reading(value, low, high, note), Reading(tau, math.nan, math.nan, note)
 
 
-def rrw_read(curve: AllanCurve) -> Reading:
+def rrw_read(curve: AllanCurve, shortest: float = 0.0) -> Reading:
     """K read with a slope +1/2 line, deg/h/√h: least squares of log σ = log K + ½ log(τ/3), weight edf.
 
     The line goes through the points from twice the τ of the minimum to the end. If they span less than an octave the
     curve does not rise: the line then goes through the last octave and K is an upper limit. Limits: chi² with the
     weighted mean of the edf, because neighbouring points are nearly the same data.
+    shortest : τ from which on the curve is looked at, s
     """
-    usable = (curve.edf >= FEWEST_FREEDOM) & (curve.deviation > 0)
-    if not usable.any():
+    usable = (curve.edf >= FEWEST_FREEDOM) & (curve.deviation > 0) & (curve.tau >= shortest)
+    if not curve.deviation.any():
         return Reading(0.0, 0.0, 0.0, "the series is constant")
+    if not usable.any():
+        return Reading(math.nan, math.nan, math.nan, "the curve does not reach beyond the low-pass")
     tau, deviation, edf = curve.tau[usable], curve.deviation[usable], curve.edf[usable]
     start = BEYOND_MINIMUM * tau[int(np.argmin(deviation))]
     rises = bool(tau[-1] >= 2 * start)

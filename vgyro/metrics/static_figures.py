@@ -169,7 +169,7 @@ class _Array:
     def _drift_factor(self, readings: list[dict[str, Reading]], column: int, confidence: float) -> Reading:
         number, drawn = self.singles, self.drawn
         chosen = [*range(number), column]
-        points = [lowest_point(self.measured[one].curve) for one in chosen]
+        points = [lowest_point(self.measured[one].curve, self.measured[one].low_pass.shortest_tau) for one in chosen]
         curves = [self.measured[one].curve for one in chosen]
         tau = np.array([curve.tau[point] for curve, point in zip(curves, points, strict=True)])
         lowest = np.array([readings[one]["bias_drift"].value for one in chosen])

@@ -77,10 +77,12 @@ LOWER_IS_BETTER = (
     "error_sigma_scaled",
     "angle_drift_60s",
 )
+NEEDS = {"arw": "ARW", "rrw": "RRW", "correlation": "ρ", "weights": "H_t"}
+NEEDS_HINT = "what it takes beside the rates; ρ: correlation of the noise; H_t: weights of the volatility analysis"
 METHOD, RESPONSE = "the method", "response of the method"
 PROPERTIES = (
     Column("runs", numeric=False, hint="causal: sample t uses nothing later than t; offline: it does", group=METHOD),
-    Column("needs", numeric=False, hint="what it takes beside the rates", group=METHOD),
+    Column("needs", numeric=False, hint=NEEDS_HINT, group=METHOD),
     Column("cost", "op/sample", hint="operations a sample, all passes, counted from the equations", group=METHOD),
     Column("delay", "s", hint="at low frequency", group=RESPONSE),
     Column("DC gain", "1", hint="gain for a constant rate", group=RESPONSE),
@@ -89,7 +91,6 @@ PROPERTIES = (
     Column("known", numeric=False, hint="how the four are known", group=RESPONSE),
 )
 FAMILIES = {"baseline": "Baselines", "paper": "Methods of the papers", "ours": "Ours"}
-NEEDS = {"arw": "ARW", "rrw": "RRW", "weights": "volatility weights"}
 MOST_WIDE = 7
 LIMITS = "Below each figure: its limits."
 FACTOR_WORDS = (
@@ -104,7 +105,8 @@ BAND_WORDS = (
 )
 NEES_WORDS = (
     "NEES: mean of (error / posterior standard deviation)², 1 where the method knows its own error; the tooltip tells "
-    "the share of the samples within ±2 standard deviations."
+    "the share of the samples within ±2 standard deviations. The delay of the gyros themselves, and a bias or a scale "
+    "error that all of them share, are errors, too, and cannot be seen in the array."
 )
 RESPONSE_WORDS = (
     "Cost: additions, multiplications, divisions and roots of one sample of the recording, all passes together; what "
