@@ -63,7 +63,8 @@ def choose_motion(
     models : names of those to choose from
     Each model has the parameters of its greatest likelihood. Of the FINALISTS of smallest BIC the parameters are then
     tuned to the smallest estimated error, in units of the noise, and the model of the smallest
-    error + (parameters)·ln(samples) is taken. A constant rate is a legal answer: q = 0.
+    error + (parameters)·ln(samples) is taken; in doubt, by less than ln(samples), the most likely one. A constant rate
+    is a legal answer: q = 0.
     Of more than 2^14 samples, four windows of 2^12 samples spread over the recording are used, and means of blocks of
     the whole of it, about 2^13, whose model is exact (but for the correlation of coloured noise between blocks); their
     scores are added. The likelihood is that given the first 16 samples of each stretch: no model pays for not knowing
@@ -77,7 +78,8 @@ def choose_motion(
     if engine != evidence.engine:
         rows = {name: _checked(row, evidence, engine) for name, row in rows.items()}
     table = tuple(rows[model] for model in models)
-    for best in sorted(finalists, key=lambda row: row.risk + _penalty(row)):
+    doubt = math.log(fits[0].samples)
+    for best in sorted(finalists, key=lambda row: row.risk + _penalty(row) + doubt * (row.model != fits[0].model)):
         motion = Motion(best.model, best.tuned, rate_hz, table)
         factor = calibration(motion, evidence)
         if math.isfinite(best.risk) and factor is not None:
