@@ -1,8 +1,8 @@
 """Rows of the maximum-likelihood smoother: one fused rate, its variance a sample, and a model of the motion.
 
-In motion the model of the rate and its parameters are those of the greatest likelihood (vgyro.fusion.smoother). In a
-recording that is at rest as a whole the likelihood would make the process noise zero and the virtual gyro deaf: there
-the smoother is the first-order low-pass of `bandwidth_hz`, run forward and back.
+In motion the model of the rate and its parameters are chosen from the data (vgyro.fusion.smoother), once for all rows.
+In a recording that is at rest as a whole the process noise would become zero and the virtual gyro deaf: there the
+smoother is the first-order low-pass of `bandwidth_hz`, run forward and back.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.errors import DataError
+from vgyro.fusion.analysed import DCC, shared_motion, shared_variances
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.conditional import conditional
 from vgyro.fusion.fixed import median
-from vgyro.fusion.parity import Variances, parity_variances
-from vgyro.fusion.smoother import Smoothed, choose_motion, fixed_bandwidth, smooth
+from vgyro.fusion.parity import Variances
+from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, smooth
 
-DCC = ("dcc", "in_sample", "residual")
 SLOW_BESIDE_POLE = 0.5
 """The sensor's pole is undone where the smoother's bandwidth is below this share of the pole's frequency."""
 REST_NOTE = "at rest as a whole: a fixed bandwidth, forward and back"
@@ -45,11 +45,6 @@ class Signal:
     note: str
     slow_variance: np.ndarray | None = None
     undo_pole: bool = False
-
-
-def shared_variances(array: ArrayRates, parameters: FilterParameters, changing: bool) -> Variances:
-    """vgyro.fusion.parity.parity_variances, estimated once for all methods that need them."""
-    return array.once(("variances", changing), lambda: parity_variances(array, parameters, changing))
 
 
 def average_smoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
@@ -175,10 +170,7 @@ def without_pole(array: ArrayRates, rate: np.ndarray, time_s: float) -> np.ndarr
 
 def _in_motion(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Smoothed:
     resting = bool(array.at_rest.any())
-    motion = choose_motion(
-        signal.rate, signal.variance, array.segment, array.rate_hz, signal.colour, parameters.motion_models,
-        parameters.engine, ~array.at_rest if resting else None,
-    )  # fmt: skip
+    motion = shared_motion(array, parameters)
     rest = fixed_bandwidth(parameters.bandwidth_hz, float(np.mean(signal.variance)), array.rate_hz) if resting else None
     return smooth(
         signal.rate, signal.variance, array.segment, array.rate_hz, motion, signal.colour, parameters.engine,

@@ -1,0 +1,92 @@
+"""What an array's own differences say of a recording, estimated once for all methods that need it.
+
+R_t, the white noise of each gyro: constant, changing with a time constant or with change points, gyro by gyro, by
+predictive likelihood (vgyro.fusion.parity); or from DCC of the residual where its causal forecasts are better by the
+test of Diebold & Mariano (1995). Slow errors b: vgyro.fusion.slow. The motion: vgyro.fusion.smoother.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vgyro.fusion.array import ArrayRates, FilterParameters
+from vgyro.fusion.blocks import SampleWeights
+from vgyro.fusion.motion_models import Motion
+from vgyro.fusion.parity import Variances, parity_variances
+from vgyro.fusion.parity_dcc import prefer_dcc
+from vgyro.fusion.slow import SlowErrors, combined_without, slow_errors
+from vgyro.fusion.slow_blocks import SlowBlocks
+from vgyro.fusion.smoother import choose_motion
+
+DCC = ("dcc", "in_sample", "residual")
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """variances : R_t;  weights : of least variance for it;  slow : b;  note : what was chosen"""
+
+    variances: Variances
+    weights: SampleWeights
+    slow: SlowErrors
+    note: str
+
+    def rate(self, array: ArrayRates) -> np.ndarray:
+        """u(t)'(y - b) [T], deg/s."""
+        return combined_without(array, self.weights, self.slow)
+
+    def variance(self) -> np.ndarray:
+        """Variance u'R_t·u of its white noise [T], (deg/s)² a sample."""
+        return self.variances.combined_variance()[self.variances.block_of_sample()]
+
+
+def shared_variances(array: ArrayRates, parameters: FilterParameters, changing: bool) -> Variances:
+    """vgyro.fusion.parity.parity_variances."""
+    return array.once(("variances", changing), lambda: parity_variances(array, parameters, changing))
+
+
+def analysed(array: ArrayRates, parameters: FilterParameters) -> Analysed:
+    """R_t and b of a recording.  raises : CannotRun, as parity_variances"""
+    return array.once("analysed", lambda: _analysed(array, parameters))
+
+
+def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
+    """How the rate moves: from the best fused rate, for every row that is smoothed.  raises : DataError, CannotRun"""
+
+    def choose() -> Motion:
+        known = analysed(array, parameters)
+        moving = ~array.at_rest if array.at_rest.any() else None
+        return choose_motion(
+            known.rate(array), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
+            parameters.motion_models, parameters.engine, moving,
+        )  # fmt: skip
+
+    return array.once("motion", choose)
+
+
+def _analysed(array: ArrayRates, parameters: FilterParameters) -> Analysed:
+    variances = shared_variances(array, parameters, True)
+    score = prefer_dcc(array, parameters, variances)
+    if score.prefer:
+        variances = _of_dcc(array, parameters, variances)
+    blocks = SlowBlocks.of(array)
+    lasting = variances.variance * (1.0 + variances.phi) / (1.0 - variances.phi)
+    white = blocks.mean_of(variances.start, lasting)
+    white[blocks.mean_of(variances.start, variances.excluded.astype(float)) > 0] = np.inf
+    slow = slow_errors(array, parameters, white, variances.correlation, blocks)
+    left_out = f"{len(array.faults)} faults left out" if array.faults else ""
+    notes = [variances.note, score.note, slow.note, left_out]
+    weights = variances.sample_weights(parameters.engine)
+    return Analysed(variances, weights, slow, "; ".join(note for note in notes if note))
+
+
+def _of_dcc(array: ArrayRates, parameters: FilterParameters, variances: Variances) -> Variances:
+    """The same with the variances that in-sample GARCH gives, where it gives any."""
+    deviations = array.deviations[DCC]
+    length = max(1, round(array.rate_hz / parameters.block_hz))
+    table = np.concatenate(list(deviations.rows([slice(0, int(deviations.block.max()) + 1)])))
+    block = deviations.block[(variances.start + variances.stop) // 2]
+    variance = length * table[np.maximum(block, 0)] ** 2
+    known = (block >= 0)[:, None] & np.isfinite(variance) & (variance > 0)
+    return replace(variances, variance=np.where(known, variance, variances.variance))
