@@ -21,7 +21,14 @@ from vgyro.fusion.faults import ALL_KINDS, search_faults, sentence
 from vgyro.storage.tables import read_json, read_metadata, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.convert import compensations_of
-from vgyro.tasks.rates_file import ArrayFile, read_array, stretch_times, times_at
+from vgyro.tasks.rates_file import (
+    ArrayFile,
+    read_array,
+    read_temperature,
+    stretch_times,
+    thermometers,
+    times_at,
+)
 
 OFF = "analysis.faults.detect is off: nothing was looked for"
 FIGURES = ("start", "stop", "evidence", "size")
@@ -35,13 +42,14 @@ def main(task: Task) -> None:
     A recording in which nothing could be looked for, or not every kind, has the reason as a note in the metadata.
     """
     options = FaultOptions.model_validate(task.options["analysis"].get("faults", {}))
-    gyros = Board.model_validate(task.options["board"]).array(task.options["axis"])
+    board = Board.model_validate(task.options["board"])
+    gyros = board.array(task.options["axis"])
     names = [gyro.name for gyro in gyros]
     rows: list[dict[str, Any]] = []
     note = OFF
     if options.detect == "auto":
         file = read_array(task.input("rates"), names, task.options["axis"])
-        array = array_of(file)
+        array = array_of(file, read_temperature(file, thermometers(board, names)))
         zero = zero_counts(file.path, gyros, task.inputs.get("calibration", []))
         search = search_faults(array, options, zero)
         note, events = search.note, search.events
@@ -55,11 +63,14 @@ def main(task: Task) -> None:
     write_table(task.output("faults"), table_of(rows), "faults", task.provenance(), extra)
 
 
-def array_of(file: ArrayFile) -> ArrayRates:
+def array_of(file: ArrayFile, temperature: np.ndarray | None) -> ArrayRates:
     """The array as the search takes it; it estimates the noise by itself."""
     gyros = file.rate.shape[1]
     unknown = ArrayNoise(np.full(gyros, math.nan), np.full(gyros, math.nan), np.eye(gyros))
-    return ArrayRates(file.rate, file.rate_hz, file.segment, file.at_rest, unknown, stretch_time=stretch_times(file))
+    times = stretch_times(file)
+    return ArrayRates(
+        file.rate, file.rate_hz, file.segment, file.at_rest, unknown, temperature=temperature, stretch_time=times
+    )
 
 
 def zero_counts(path: Path, gyros: Sequence[Gyro], calibration: Sequence[Path]) -> np.ndarray:

@@ -19,7 +19,7 @@ from vgyro.fusion.array import WeightKey
 from vgyro.fusion.events import FaultEvent, FaultKind
 from vgyro.storage.tables import ROW_GROUP, read_batches, read_columns, read_json, read_metadata, read_rows
 from vgyro.tasks.common import Task
-from vgyro.tasks.rates_file import ArrayFile, read_array, samples_before, stretch_times
+from vgyro.tasks.rates_file import ArrayFile, read_array, read_temperature, samples_before, stretch_times, thermometers
 from vgyro.tasks.volatility_series import LEVEL, MOVED
 
 T = TypeVar("T")
@@ -102,25 +102,6 @@ def read_faults(path: Path, gyros: list[str], file: ArrayFile) -> list[FaultEven
         )
         for row in range(len(rows["gyro"]))
     ]  # fmt: skip
-
-
-def thermometers(board: Board, gyros: list[str]) -> list[str]:
-    """Columns of rates.parquet with the temperatures of these gyros; of the board where they have none."""
-    own = [f"temp_{one.name}" for one in board.temperatures if one.gyro in gyros]
-    return own or [f"temp_{one.name}" for one in board.temperatures if one.gyro is None]
-
-
-def read_temperature(file: ArrayFile, columns: list[str]) -> np.ndarray | None:
-    """Mean of some temperatures [T], °C, in single precision; None where there is none."""
-    columns = [name for name in columns if name in pq.read_schema(file.path).names]
-    if not columns:
-        return None
-    mean, first = np.empty(len(file.segment), dtype=np.float32), 0
-    for batch in read_batches(file.path, columns):
-        rows = slice(first, first + len(batch[columns[0]]))
-        mean[rows] = sum(batch[name] for name in columns) / len(columns)
-        first = rows.stop
-    return mean
 
 
 def in_motion(kind: str, at_rest: np.ndarray) -> bool:

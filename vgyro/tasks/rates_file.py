@@ -11,6 +11,7 @@ from typing import overload
 import numpy as np
 import pyarrow.parquet as pq
 
+from vgyro.board import Board
 from vgyro.errors import DataError
 from vgyro.metrics.sampling import Sampling
 from vgyro.storage.tables import read_batches, read_column, read_metadata
@@ -83,6 +84,25 @@ def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
             column[rows] = batch[gyro]
         first = rows.stop
     return ArrayFile(rate.T, segment, at_rest, float(metadata["rate_hz"]), path, axis)
+
+
+def thermometers(board: Board, gyros: list[str]) -> list[str]:
+    """Columns of rates.parquet with the temperatures of these gyros; of the board where they have none."""
+    own = [f"temp_{one.name}" for one in board.temperatures if one.gyro in gyros]
+    return own or [f"temp_{one.name}" for one in board.temperatures if one.gyro is None]
+
+
+def read_temperature(file: ArrayFile, columns: list[str]) -> np.ndarray | None:
+    """Mean of some temperatures [T], °C, in single precision; None where there is none."""
+    columns = [name for name in columns if name in pq.read_schema(file.path).names]
+    if not columns:
+        return None
+    mean, first = np.empty(len(file.segment), dtype=np.float32), 0
+    for batch in read_batches(file.path, columns):
+        rows = slice(first, first + len(batch[columns[0]]))
+        mean[rows] = sum(batch[name] for name in columns) / len(columns)
+        first = rows.stop
+    return mean
 
 
 def stretch_times(file: ArrayFile) -> np.ndarray:

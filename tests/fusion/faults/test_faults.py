@@ -97,6 +97,45 @@ def test_faults_at_the_same_time_accuse_no_other(motion):
     assert events[0, "burst"].size == pytest.approx(5, rel=0.2)
 
 
+def test_many_bursts_cast_no_shadows():
+    # Truth: g1 and g2 have a burst of ten times the noise in turn, every 30 s; g4 has five times the noise throughout.
+    array = healthy(51, 600.0, motion=True)
+    rate, rng = array.rate(), np.random.default_rng(4)
+    white = array.sigma * np.sqrt(RATE_HZ)
+    rate[:, 3] += np.sqrt(24) * white[3] * rng.standard_normal(len(rate))
+    starts = np.arange(5, 600, 30)
+    for number, start in enumerate(starts):
+        inside = (array.time >= start) & (array.time < start + 3)
+        rate[inside, number % 2] += np.sqrt(99) * white[number % 2] * rng.standard_normal(inside.sum())
+    events = find_faults(array_of(rate))
+    assert [(one.gyro, one.kind) for one in events] == [(number % 2, "burst") for number in range(len(starts))]
+    assert np.abs([one.start * SAMPLE_S for one in events] - starts).max() <= 1
+    assert np.median([one.size for one in events]) == pytest.approx(10, rel=0.1)
+
+
+def test_what_the_temperature_does_is_no_fault_where_it_is_logged():
+    # Truth: a warm-up of 12 K, and a gyro of another coefficient: 2 σ of the 1 s mean of a healthy one a kelvin.
+    array = healthy(52, 3600.0)
+    warm = 12.0 * (1.0 - np.exp(-array.time / 600.0))
+    rate = array.rate()
+    rate[:, 5] += 2.0 * array.sigma[5] * warm
+    plain = array_of(rate)
+    assert [one.gyro for one in find_faults(plain)] == [5]
+    logged = 25.0 + warm + 0.05 * np.random.default_rng(6).standard_normal(len(warm))
+    assert find_faults(replace(plain, temperature=logged.astype(np.float32))) == []
+
+
+def test_a_fault_is_found_beside_the_temperature():
+    # Truth: a step of 5 σ while the board warms up.
+    array = healthy(53, 3600.0)
+    rate, late = array.rate(), array.time >= 1500
+    rate[late, 2] += 5.0 * array.sigma[2]
+    warm = 25.0 + 8.0 * (1.0 - np.exp(-array.time / 400.0))
+    (event,) = find_faults(replace(array_of(rate), temperature=warm.astype(np.float32)))
+    assert (event.gyro, event.kind) == (2, "step")
+    assert event.start * SAMPLE_S == pytest.approx(1500, abs=10)
+
+
 def test_a_fault_of_most_of_the_recording_does_not_become_its_health():
     # Truth: g4 drifts from 1000 s of 3600 s on, as in Liu et al. (2015), to 15 σ, without more noise.
     array = healthy(7, 3600.0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,9 +18,11 @@ gyro comes in clusters, too, the higher the shorter they are."""
 LOW_SHARE = 0.15
 LOW_PLACE = 1.036
 """So many standard deviations above its 15 % quantile lies the median of a normal variable."""
+MOST_AT_ONCE = 64
 APART = 64
 """Blocks between two windows whose noise no longer depends on each other's (GARCH noise of α + β = 0.95: 4 %)."""
 FEWEST_WINDOWS = 16
+LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -38,10 +41,11 @@ class NoiseLevel:
     share: float
 
 
-def noise_level(found: Residuals, gyro: int, counts: np.ndarray) -> NoiseLevel:
+def noise_level(found: Residuals, gyro: int, counts: np.ndarray, healthy: np.ndarray) -> NoiseLevel:
     """The log-variances, their usual level and how far it wanders by itself.
 
-    counts : [B], false where something else than noise is known to be wrong
+    counts  : [B], false where something else than noise is known to be wrong
+    healthy : [B], true where the noise is not known to be at fault: what is usual is seen there
     The usual level is found from below, for the fault may last for most of the recording; how far it wanders, from
     differences between windows far apart, most of which no single change falls between. In motion the residual grows
     by a share of the motion that belongs to the array, not to a fault: scale factors, axes and clocks differ a little.
@@ -49,17 +53,19 @@ def noise_level(found: Residuals, gyro: int, counts: np.ndarray) -> NoiseLevel:
     variance, expected = found.variance[:, gyro], found.expected[:, gyro]
     counts = counts & np.isfinite(variance) & (variance > 0)
     level = np.zeros(len(variance))
+    healthy = healthy & counts if (healthy & counts).sum() >= FEWEST_WINDOWS else counts
     if not counts.any():
         return NoiseLevel(level, counts, {}, 1.0)
     level[counts] = np.log(variance[counts] / expected[counts])
-    usual = _usual(level[counts])
+    usual = _usual(level[healthy])
     usual_variance = expected * np.exp(usual)
-    leak = _leak(found, gyro, counts, usual_variance)
+    leak = _leak(found, gyro, healthy, usual_variance)
     level[counts] -= np.log1p(leak * found.energy[counts, gyro] / usual_variance[counts])
-    level[counts] -= _usual(level[counts])
-    level = np.where(counts, level, 0.0)
-    share = float(np.median(found.sigma2[gyro] / expected))
-    return NoiseLevel(level, counts, _spreads(level[counts], len(level)), share)
+    usual_level = _usual(level[healthy])
+    level = np.where(counts, level - usual_level, 0.0)
+    others = (expected - found.sigma2[gyro]) / (usual_variance * np.exp(usual_level))
+    share = float(np.clip(1.0 - np.median(others), LEAST_SHARE, 1.0))
+    return NoiseLevel(level, counts, _spreads(level[healthy], len(level)), share)
 
 
 def _usual(level: np.ndarray) -> float:
@@ -99,12 +105,28 @@ def least_ratio(seconds: float) -> float:
     return LEAST_LONG + (LEAST_SHORT - LEAST_LONG) * min(1.0, SHORT_S / seconds)
 
 
-def suspect_noise(state: NoiseLevel, gyro: int, block_s: float, burst_s: float, threshold: float) -> Candidate | None:
-    """The window in which the noise is farthest above the usual, its ends by maximum likelihood; None: in none.
+def suspect_noise(
+    state: NoiseLevel, gyro: int, block_s: float, burst_s: float, threshold: float
+) -> Iterator[Candidate]:
+    """The windows in which the noise is far above the usual, the farthest first, their ends by maximum likelihood.
 
     block_s : length of a block, s;  burst_s : a shorter event is a burst
     The evidence is the mean log-variance of the window over its standard deviation in health.
     """
+    level, counts = state.level.copy(), state.counts.copy()
+    for _ in range(MOST_AT_ONCE):
+        found = _farthest(replace(state, level=level, counts=counts), block_s, threshold)
+        if found is None:
+            return
+        evidence, first, last, mean = found
+        ratio, seconds = ratio_of(mean, state.share), (last - first) * block_s
+        if ratio >= least_ratio(seconds):
+            yield Candidate(gyro, "burst" if seconds < burst_s else "noise", first, last, evidence, ratio, "1")
+        level[first:last], counts[first:last] = 0.0, False
+
+
+def _farthest(state: NoiseLevel, block_s: float, threshold: float) -> tuple[float, int, int, float] | None:
+    """Evidence, first and last block, and mean level of the window that is farthest above the usual."""
     sums, usable = running_sum(state.level), running_sum(state.counts)
     best: tuple[float, int, int] | None = None
     for length, scatter in state.spread.items():
@@ -122,16 +144,19 @@ def suspect_noise(state: NoiseLevel, gyro: int, block_s: float, burst_s: float, 
     evidence, first, last = best
     # What is below the usual counts as usual: only an increase is looked for.
     first, last = best_interval(sums, first, last)
-    while last < len(state.counts) and not state.counts[last]:
-        last += 1
     number = max(usable[last] - usable[first], 1.0)
     mean = float(sums[last] - sums[first]) / number
     length = 1 << int(np.log2(number))
     evidence = max(evidence, mean / state.spread[length] * np.sqrt(number / length))
-    ratio, seconds = ratio_of(mean, state.share), (last - first) * block_s
-    if ratio < least_ratio(seconds):
-        return None
-    return Candidate(gyro, "burst" if seconds < burst_s else "noise", first, last, evidence, ratio, "1")
+    while last < len(state.counts) and not state.counts[last]:
+        last += 1
+    return evidence, first, last, mean
+
+
+def mean_level(state: NoiseLevel, first: int, last: int) -> float:
+    """Mean log-variance over the usual one in blocks [first, last)."""
+    number = state.counts[first:last].sum()
+    return float(state.level[first:last].sum()) / number if number else 0.0
 
 
 def ratio_of(level: float, share: float) -> float:

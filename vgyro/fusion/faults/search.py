@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,10 +14,11 @@ from vgyro.fusion.faults.bias import suspect_bias
 from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums, silent_share
 from vgyro.fusion.faults.candidate import Candidate
 from vgyro.fusion.faults.dead import find_dead
-from vgyro.fusion.faults.noise import noise_level, suspect_noise
+from vgyro.fusion.faults.noise import NoiseLevel, mean_level, noise_level, ratio_of, suspect_noise
 from vgyro.fusion.faults.residuals import Residuals, Spoilt, common_ratio, residuals_of, usual_variance
 from vgyro.fusion.faults.scale import LEAST_CHANGE, slope_in, suspect_scale, usual_slope
 from vgyro.fusion.faults.wander import bends_of, healthy_array, local_variance, slow_part
+from vgyro.fusion.faults.warmth import block_temperature, without_temperature
 
 FEWEST_GYROS = 3
 FEWEST_BLOCKS = 20
@@ -25,10 +26,11 @@ LONGEST_GAP_S = 60.0
 MOST_ROUNDS = 100
 MOST_COMMON = 2.0
 """Where the gyro in the middle of the array has more than this times its usual variance, no single one is judged."""
-NEAR = 8  # blocks: candidates nearer to each other than this are not taken in one round
+NEAR = 8  # blocks: events of a kind that are nearer to each other are one
 ONLY_DEAD = "only stuck and dropout were looked for"
 TOO_FEW = f"fewer than three gyros: a difference does not tell which of two is at fault; {ONLY_DEAD}"
 TOO_SHORT = f"less than {FEWEST_BLOCKS} blocks; {ONLY_DEAD}"
+LEAST_HEALTHY = 0.05
 MOST_SILENT = 0.02
 TOO_COARSE = f"the counts are too coarse for the noise: blocks hold one value alone; {ONLY_DEAD}"
 BIAS_KINDS = ("step", "drift")
@@ -78,7 +80,9 @@ def search_faults(array: ArrayRates, options: FaultOptions | None = None, zero: 
     sums = block_sums(array, length, stretches, LONGEST_GAP_S)
     if np.median(silent_share(sums)) > MOST_SILENT:
         return Search(dead, TOO_COARSE)
-    state = _State(sums, length * array.period, options, _spoilt_by(dead, sums))
+    state = _State(
+        sums, length * array.period, options, _spoilt_by(dead, sums), block_temperature(array.temperature, sums.edges)
+    )
     found = [_in_samples(one, sums) for one in _merged(state.search(), options.burst_s / state.block_s)]
     return Search(sorted([*dead, *found], key=lambda event: (event.start, event.gyro, event.kind)))
 
@@ -99,6 +103,7 @@ class _State:
     block_s: float
     options: FaultOptions
     dead: list[Spoilt]
+    temperature: np.ndarray | None = None
     taken: list[Candidate] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -110,13 +115,14 @@ class _State:
         self._judge(sigma2, gain)
         for _ in range(MOST_ROUNDS):
             found = residuals_of(self.sums, sigma2, gain, self._spoilt())
-            accepted = list(_apart(self._suspects(found)))
+            accepted = self._strongest(found)
             if not accepted:
                 break
             self.taken += accepted
             if any(one.kind == "scale" for one in accepted):
                 gain = self._gain(sigma2)
-        return [one for one in self.taken if one.kind != "scale" or abs(one.size) >= LEAST_CHANGE]
+        taken = [one for one in self.taken if one.kind != "scale" or abs(one.size) >= LEAST_CHANGE]
+        return self._sized(taken, found)
 
     def _judge(self, sigma2: np.ndarray, gain: np.ndarray) -> None:
         """Leave out the blocks in motion in which most gyros leave the others at once: that is the array, not a gyro.
@@ -173,40 +179,73 @@ class _State:
                     counts[max(0, place - 2) : place + 2] = False
         return counts
 
-    def _suspects(self, found: Residuals) -> list[Candidate]:
-        """The strongest suspicion of every gyro and kind."""
-        threshold, run = self.options.threshold, self.run
-        suspects: list[Candidate | None] = []
-        counts = [self._counts(gyro, BIAS_KINDS) for gyro in range(self.sums.gyros)]
-        healthy = [self._counts(gyro, FAULT_KINDS) for gyro in range(self.sums.gyros)]
-        slow = [slow_part(found, gyro, counts[gyro], run) for gyro in range(self.sums.gyros)]
+    def _strongest(self, found: Residuals) -> list[Candidate]:
+        """The strongest suspicion of all, no weaker than the threshold.
+
+        If it is one of noise, that gyro's others come with it, wherever it has more of it than any other gyro: in one
+        round, since bursts are many. Anything else could be a shadow of what was not taken yet.
+        """
+        levels = [self._level(found, gyro) for gyro in range(self.sums.gyros)]
+        noises = [self._noises(state, gyro) for gyro, state in enumerate(levels)]
+        suspects = [one for part in noises for one in part] + self._other_suspects(found)
+        if not suspects:
+            return []
+        first = max(suspects, key=lambda one: one.evidence)
+        if first.kind not in NOISE_KINDS:
+            return [first]
+
+        def loudest(one: Candidate) -> bool:
+            return one.gyro == max(range(len(levels)), key=lambda gyro: mean_level(levels[gyro], one.first, one.last))
+
+        return [one for one in noises[first.gyro] if one == first or loudest(one)]
+
+    def _level(self, found: Residuals, gyro: int) -> NoiseLevel:
+        counts = self._counts(gyro, (), (*BIAS_KINDS, "scale"))
+        return noise_level(found, gyro, counts, self._counts(gyro, NOISE_KINDS))
+
+    def _noises(self, state: NoiseLevel, gyro: int) -> list[Candidate]:
+        """Suspicions of noise where none is known yet."""
+        free = self._counts(gyro, NOISE_KINDS) & state.counts
+        state = replace(state, level=np.where(free, state.level, 0.0), counts=free)
+        return list(suspect_noise(state, gyro, self.block_s, self.options.burst_s, self.options.threshold))
+
+    def _other_suspects(self, found: Residuals) -> list[Candidate]:
+        """The strongest suspicion of every gyro, of a step or drift and of a change of scale."""
+        threshold, run, gyros = self.options.threshold, self.run, range(self.sums.gyros)
+        counts = [self._counts(gyro, BIAS_KINDS) for gyro in gyros]
+        healthy = [self._counts(gyro, FAULT_KINDS) for gyro in gyros]
+        means = [without_temperature(found.mean[:, gyro], self.temperature, healthy[gyro], run) for gyro in gyros]
+        slow = [slow_part(found, gyro, counts[gyro], run, means[gyro]) for gyro in gyros]
         bends = [bends_of(part, one) for part, one in zip(slow, healthy, strict=True)]
-        local = [local_variance(found, gyro) for gyro in range(self.sums.gyros)]
+        local = [local_variance(found, gyro) for gyro in gyros]
         health = healthy_array(slow, bends)
         # What the motion is compared with is slow: noise of that sort is stronger than samples show if it has a colour.
         shares = [np.median(part.white * self.sums.count / one) for part, one in zip(health, local, strict=True)]
         colour = max(1.0, float(np.median(shares)))
+        suspects = []
         for gyro, part in enumerate(health):
-            suspects.append(suspect_bias(part, gyro, self.block_s, threshold))
-            level = noise_level(found, gyro, self._counts(gyro, NOISE_KINDS, (*BIAS_KINDS, "scale")))
-            suspects.append(suspect_noise(level, gyro, self.block_s, self.options.burst_s, threshold))
             steady = self._counts(gyro, ("scale",), BIAS_KINDS)
+            bias = suspect_bias(part, gyro, self.block_s, threshold)
+            suspects.append(bias if bias is not None and self._is_event(bias) else None)
             suspects.append(suspect_scale(self.sums, found, gyro, steady, colour * local[gyro], threshold))
         return [one for one in suspects if one is not None]
 
+    def _is_event(self, one: Candidate) -> bool:
+        """What would be off for all of a run has nothing left that it could be off from."""
+        run = self.run == self.run[one.first]
+        good = self._counts(one.gyro, BIAS_KINDS) & run
+        good[one.first : one.last] = False
+        return bool(good.sum() >= LEAST_HEALTHY * run.sum())
 
-def _apart(suspects: Sequence[Candidate]) -> Iterator[Candidate]:
-    """The strongest, and what is apart from all that is stronger: that would not look different without it.
-
-    A change of scale comes alone: it changes what is usual all over the recording.
-    """
-    stronger: list[Candidate] = []
-    for one in sorted(suspects, key=lambda one: -one.evidence):
-        if stronger and "scale" in (one.kind, stronger[0].kind):
-            continue
-        if all(one.last + NEAR <= other.first or other.last + NEAR <= one.first for other in stronger):
-            yield one
-        stronger.append(one)
+    def _sized(self, taken: Sequence[Candidate], found: Residuals) -> list[Candidate]:
+        """Noise over that of the gyro's healthy stretches, now that these are known."""
+        sized = []
+        for one in taken:
+            if one.kind in NOISE_KINDS:
+                state = self._level(found, one.gyro)
+                one = replace(one, size=ratio_of(mean_level(state, one.first, one.last), state.share))
+            sized.append(one)
+        return sized
 
 
 def _merged(found: Sequence[Candidate], burst_blocks: float) -> list[Candidate]:

@@ -70,9 +70,9 @@ def local_variance(found: Residuals, gyro: int) -> np.ndarray:
     return np.maximum((sums[high] - sums[low]) / (high - low), variance)
 
 
-def slow_part(found: Residuals, gyro: int, counts: np.ndarray, run: np.ndarray) -> Slow:
-    """The residual means of a gyro, blocks that do not count bridged by a straight line."""
-    mean = found.mean[:, gyro].copy()
+def slow_part(found: Residuals, gyro: int, counts: np.ndarray, run: np.ndarray, mean: np.ndarray) -> Slow:
+    """The residual means [B] of a gyro as a series without holes: a straight line bridges blocks that do not count."""
+    mean = mean.copy()
     if counts.any() and not counts.all():
         places = np.arange(len(mean))
         mean[~counts] = np.interp(places[~counts], places[counts], mean[counts])
