@@ -32,6 +32,7 @@ BEST_RULES = (
     "above the best of theirs.",
 )
 Name = tuple[str, str]
+RECOMMENDED: Name = ("recommended", "")
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def rest_sentences(dataset: DatasetPart, array: ArrayPart) -> list[Conclusion]:
     listed = _listed(array)
     if not listed:
         return []
-    found = [Conclusion(f"Best method at rest ({place}): {listed}.", "", array.anchor)]
+    found = [*_recommended(array, place), Conclusion(f"Best method at rest ({place}): {listed}.", "", array.anchor)]
     if OFFLINE in listed:
         causal = _listed(array, causal=True)
         found += [Conclusion(f"Best causal method at rest ({place}): {causal}.", "", array.anchor)] if causal else []
@@ -105,6 +106,15 @@ def rest_sentences(dataset: DatasetPart, array: ArrayPart) -> list[Conclusion]:
     if compared:
         found.append(Conclusion(f"Causal DCC ({place}) {'; '.join(compared)}.", "", array.anchor))
     return found + _failing_sentence(dataset, array, place)
+
+
+def _recommended(array: ArrayPart, place: str) -> list[Conclusion]:
+    """What the recommended method reaches at rest; nothing where it did not run."""
+    known = _known(array, RECOMMENDED)
+    said = [f"{factor(known[figure])} by {words}" for figure, words in factors_of(array) if figure in known]
+    if not said:
+        return []
+    return [Conclusion(f"Recommended virtual gyro ({place}): improvement factor {', '.join(said)}.", "", array.anchor)]
 
 
 def _listed(array: ArrayPart, *, causal: bool = False) -> str:
@@ -187,6 +197,8 @@ def motion_sentences(dataset: DatasetPart) -> list[Conclusion]:
         if causal and not _causal(array, best):
             first = min(causal, key=lambda name: errors[name].value)
             text += f"{OFFLINE}, of the causal methods {significant(errors[first].value)}, by {labels[first]}"
+        if RECOMMENDED in errors and best != RECOMMENDED:
+            text += f"; the recommended method {interval(errors[RECOMMENDED])}"
         if ("average", "") in errors:
             text += f", against {significant(errors['average', ''].value)} of the average"
         found.append(Conclusion(f"{text}.", "", array.anchor))
