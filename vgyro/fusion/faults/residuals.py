@@ -14,6 +14,7 @@ Span = tuple[int, int]
 
 LEVEL_BLOCKS = 32
 LEAST_SHARE = 0.02
+ROUNDS = 3
 IN_MOTION = 25.0
 """A block moves where the motion's variance in it is so many times that of the noise of the combination."""
 
@@ -52,28 +53,35 @@ class Residuals:
 
 
 def usual_variance(sums: BlockSums) -> np.ndarray:
-    """Variance of a sample of each gyro [N], from the residuals against the average of the others.
+    """Variance of a sample of each gyro [N], from the residuals against the combination of the others.
 
-    The median over the blocks of c'Gc, c = (1, -1/(N-1), …), is σ_i² + Σ_{j≠i} σ_j²/(N-1)², which is solved for σ².
+    The median over the blocks of c'Gc, c = (1, -u_j, …), is σ_i² + Σ_{j≠i} u_j²·σ_j², which is solved for σ²; first
+    with equal shares u, then with those of inverse variance, in which a noisy gyro hardly counts.
     """
     gyros = sums.gyros
-    mix = np.where(np.eye(gyros, dtype=bool), 1.0, -1.0 / (gyros - 1))
-    seen = np.median(np.einsum("ip,bpq,iq->bi", mix, sums.moment[:, :gyros, :gyros], mix, optimize=True), axis=0)
-    solved = np.linalg.solve(mix**2, seen)
-    return np.maximum(solved, LEAST_SHARE * np.median(seen))
+    sigma2 = np.ones(gyros)
+    for _ in range(ROUNDS):
+        share = np.where(np.eye(gyros, dtype=bool), 0.0, 1.0 / sigma2)
+        mix = np.eye(gyros) - share / share.sum(axis=1, keepdims=True)
+        seen = np.median(np.einsum("ip,bpq,iq->bi", mix, sums.moment[:, :gyros, :gyros], mix, optimize=True), axis=0)
+        sigma2 = np.maximum(np.linalg.solve(mix**2, seen), LEAST_SHARE * np.median(seen))
+    return sigma2
 
 
 def common_ratio(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """Variance over usual variance of the gyro in the middle of the array [B]: whether most leave the others at once.
+    """How far most gyros leave the others at once [B]: variance of a difference in a block over the usual one.
 
-    gain : [N] sensitivities. The variances of the gyros come from the residuals as in usual_variance, block by block.
+    gain : [N] sensitivities
+    Of each gyro its median over the partners, the lower one, then the median of the gyros: a few bad ones do not count.
     """
     gyros = sums.gyros
-    mix = np.where(np.eye(gyros, dtype=bool), 1.0, -1.0 / (gyros - 1))
-    parts = mix / gain
-    parts = np.column_stack([parts, parts.sum(axis=1)])
-    seen = np.einsum("ip,bpq,iq->bi", parts, sums.moment, parts, optimize=True)
-    return np.median(np.linalg.solve(mix**2, seen.T).T / sigma2, axis=1)
+    parts = np.column_stack([np.diag(1.0 / gain), 1.0 / gain])
+    moment = np.einsum("ip,bpq,jq->bij", parts, sums.moment, parts, optimize=True)
+    own = np.diagonal(moment, axis1=1, axis2=2)
+    ratio = (own[:, :, None] + own[:, None, :] - 2.0 * moment) / (sigma2[:, None] + sigma2)
+    # Itself, with no difference at all, comes first in the order.
+    of_each = np.sort(ratio, axis=2)[:, :, 1 + (gyros - 2) // 2]
+    return np.median(of_each, axis=1)
 
 
 def residuals_of(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray, spoilt: Sequence[Spoilt]) -> Residuals:

@@ -31,6 +31,7 @@ ONLY_DEAD = "only stuck and dropout were looked for"
 TOO_FEW = f"fewer than three gyros: a difference does not tell which of two is at fault; {ONLY_DEAD}"
 TOO_SHORT = f"less than {FEWEST_BLOCKS} blocks; {ONLY_DEAD}"
 LEAST_HEALTHY = 0.05
+COMMON_ERRORS = 6.0
 MOST_SILENT = 0.02
 TOO_COARSE = f"the counts are too coarse for the noise: blocks hold one value alone; {ONLY_DEAD}"
 BIAS_KINDS = ("step", "drift")
@@ -131,7 +132,9 @@ class _State:
         biases may be others, as gravity has another direction. So a run ends there, too.
         """
         moving = residuals_of(self.sums, sigma2, gain, self.dead).moving
-        apart = moving & (common_ratio(self.sums, sigma2, np.median(gain, axis=0)) > MOST_COMMON)
+        # A variance of few samples is several times its mean by chance.
+        most = np.maximum(MOST_COMMON, 1.0 + COMMON_ERRORS * np.sqrt(2.0 / self.sums.count))
+        apart = moving & (common_ratio(self.sums, sigma2, np.median(gain, axis=0)) > most)
         self.judged = ~(apart | np.append(apart[1:], False) | np.append(False, apart[:-1]))
         hard = apart & (np.append(apart[1:], False) | np.append(False, apart[:-1]))
         begins = np.flatnonzero(np.diff(np.append(False, hard).astype(np.int8)) != 0)
@@ -243,7 +246,9 @@ class _State:
         for one in taken:
             if one.kind in NOISE_KINDS:
                 state = self._level(found, one.gyro)
-                one = replace(one, size=ratio_of(mean_level(state, one.first, one.last), state.share))
+                usual = state.level[state.counts & self._counts(one.gyro, NOISE_KINDS)]
+                level = mean_level(state, one.first, one.last) - (float(np.median(usual)) if usual.size else 0.0)
+                one = replace(one, size=ratio_of(level, state.share))
             sized.append(one)
         return sized
 
