@@ -141,6 +141,20 @@ def test_the_best_causal_method_stands_beside_an_offline_one(dataset: DatasetPar
     assert "by Recommended (offline), of the causal methods 0.01" in motion
 
 
+def test_the_recommended_method_is_named_wherever_it_stands(dataset: DatasetPart) -> None:
+    said = [one.text for one in conclude(with_metric(dataset, "recommended", "if_sigma_equal", 1.25))]
+    (at_rest,) = [text for text in said if text.startswith("Recommended virtual gyro (axis x")]
+    assert "improvement factor 1.25" in at_rest
+    (motion,) = [
+        one.text for one in conclude(with_error(dataset, "recommended", 9.0)) if one.text.startswith("In motion")
+    ]
+    assert "; the recommended method 9" in motion
+    (motion,) = [
+        one.text for one in conclude(with_error(dataset, "recommended", 0.001)) if one.text.startswith("In motion")
+    ]
+    assert "the recommended method" not in motion
+
+
 def test_what_a_smoother_of_another_shape_reads_is_never_the_best(dataset: DatasetPart) -> None:
     array = array_of(with_metric(dataset, "average", "if_sigma_equal", 9.0))
     assert best_method(array, "if_sigma_equal").method == "average"
