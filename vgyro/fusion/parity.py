@@ -15,11 +15,12 @@ import numpy as np
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters
 from vgyro.fusion.blocks import PIECE, SampleWeights
 from vgyro.fusion.parity_blocks import BlockMoments, block_moments
-from vgyro.fusion.parity_changing import changing_variances
+from vgyro.fusion.parity_changing import Changing, changing_variances
 from vgyro.fusion.parity_colour import colour
 from vgyro.fusion.parity_hat import constant_variances, patterns
 from vgyro.fusion.parity_hat import cornered_hat as cornered_hat
 from vgyro.fusion.parity_hat import pair_variances as pair_variances
+from vgyro.fusion.parity_rest import Resting, resting_noise
 from vgyro.fusion.weights import min_variance_weights
 
 FEWEST_BLOCKS = 16
@@ -36,7 +37,8 @@ class Variances:
     excluded [M, N]  : at fault, or stuck
     tau_s [N]        : time constant of the two-sided EWMA, s; infinite: constant, but for the change points
     changes [N]      : number of change points
-    correlation [N, N] : of the noise, the same all the time
+    correlation [N, N] : of the noise, the same all the time, or about the mean of
+    moving [M, N, N] : that of each block; None: the same all the time
     phi [N]          : correlation of a gyro's noise from one sample to the next; 0 where it is not significant
     note             : what to know before using it
     """
@@ -50,6 +52,7 @@ class Variances:
     correlation: np.ndarray
     phi: np.ndarray
     note: str = ""
+    moving: np.ndarray | None = None
 
     @property
     def gyros(self) -> int:
@@ -69,7 +72,10 @@ class Variances:
             kept = np.flatnonzero(~pattern)
             part = self.correlation[np.ix_(kept, kept)]
             for begin in range(0, len(rows), PIECE):
-                here = np.ix_(rows[begin : begin + PIECE], kept)
+                piece = rows[begin : begin + PIECE]
+                here = np.ix_(piece, kept)
+                if self.moving is not None:
+                    part = self.moving[np.ix_(piece, kept, kept)]
                 weights[here] = min_variance_weights(sigma[here][:, :, None] * sigma[here][:, None, :] * part, engine)
         weights[self.excluded.all(axis=1)] = 1.0 / self.gyros
         return weights
@@ -85,6 +91,8 @@ class Variances:
     def combined_variance(self, weights: np.ndarray | None = None) -> np.ndarray:
         """u'Ru [M], (deg/s)², of one sample of the combination; weights u [M, N], None: those of least variance."""
         parts = (self.weights() if weights is None else weights) * np.sqrt(self.variance)
+        if self.moving is not None:
+            return np.einsum("bi,bij,bj->b", parts, self.moving, parts)
         return np.sum((parts @ self.correlation) * parts, axis=1)
 
     def colour(self, weights: np.ndarray | None = None) -> float:
@@ -115,15 +123,23 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     constant, outlier = constant_variances(moments, correlation)
     variance = np.broadcast_to(constant, moments.excluded.shape)
     tau, changes = np.full(gyros, math.inf), np.zeros(gyros, dtype=np.int64)
+    moving = None
     if changing:
         block_s = float(np.median(moments.size)) / array.rate_hz
-        found = changing_variances(moments, constant, outlier, correlation, block_s, parameters.engine)
+        found: Changing | Resting
+        if array.at_rest.all():
+            found = resting_noise(
+                block_moments(array, own=True), constant, correlation, block_s, parameters.engine
+            )  # fmt: skip
+            moving = found.correlation
+        else:
+            found = changing_variances(moments, constant, outlier, correlation, block_s, parameters.engine)
         variance, tau = found.variance, np.array([memory.tau_s for memory in found.memories])
         changes = np.array([len(memory.points) for memory in found.memories])
     phi = colour(array, moments, constant)
     note = _note(moments, correlation, gyros)
     return Variances(
-        moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note
+        moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note, moving
     )  # fmt: skip
 
 

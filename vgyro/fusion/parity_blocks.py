@@ -34,7 +34,7 @@ class BlockMoments:
 
     start, stop [M] int64 : their samples
     low, high [M]         : first and last block of the window about each that its slow part is the mean over
-    square [M, N, N]      : Σ dd' over the samples, (deg/s)², d = y - mean over the gyros
+    square [M, N, N]      : Σ dd' over the samples, (deg/s)², d = y - mean over the gyros, or over the recording
     mean [M, N]           : mean of d, deg/s
     excluded [M, N]       : at fault, or stuck
     """
@@ -70,10 +70,14 @@ class BlockMoments:
         return np.maximum(total, 0.0) / self.size[:, None], mean
 
 
-def block_moments(array: ArrayRates, size: int | None = None) -> BlockMoments:
-    """Moments of blocks of `size` samples; None: of about 0.25 s, 16 samples at least, single ones below 8 Hz."""
+def block_moments(array: ArrayRates, size: int | None = None, own: bool = False) -> BlockMoments:
+    """Moments of blocks of `size` samples; None: of about 0.25 s, 16 samples at least, single ones below 8 Hz.
+
+    own : of the rates themselves, each less its mean over the recording, in place of the differences
+    """
     start, stop, low, high = _edges(array, block_size(array.rate_hz) if size is None else size)
     gyros = array.rate.shape[1]
+    level = np.array([column.mean(dtype=float) for column in array.rate.T])[:, None] if own else None
     square = np.empty((len(start), gyros, gyros))
     mean = np.empty((len(start), gyros))
     step = np.empty((len(start), gyros))
@@ -82,7 +86,7 @@ def block_moments(array: ArrayRates, size: int | None = None) -> BlockMoments:
         begin = start[blocks] - rows.start
         values = np.array(array.rate[rows].T, dtype=float, order="C")
         step[blocks] = _steps(values, array.rate[rows.start - 1] if rows.start else values[:, 0], begin)
-        values -= values.mean(axis=0)
+        values -= values.mean(axis=0) if level is None else level
         mean[blocks] = (_sums(values, begin) / (stop[blocks] - start[blocks])).T
         for one in range(gyros):
             for other in range(one + 1):

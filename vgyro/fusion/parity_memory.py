@@ -47,11 +47,12 @@ class Memory:
             relative = Memory(np.empty(0, dtype=np.int64), self.keep, self.tau_s)
             with_it, without = relative.average(square / base, freedom, low_pass)
             return base * with_it, alone * without
-        around, near = _both_sides(total, self.keep, low_pass), _both_sides(freedom, self.keep, low_pass)
+        around, near = both_sides(total, self.keep, low_pass), both_sides(freedom, self.keep, low_pass)
         return _ratio(around, near, level), _ratio(around - total, near - freedom, level)
 
 
-def _both_sides(values: np.ndarray, keep: float, low_pass: LowPass) -> np.ndarray:
+def both_sides(values: np.ndarray, keep: float, low_pass: LowPass) -> np.ndarray:
+    """Σ_c keep^|b - c|·values_c [M] of values [M]."""
     ahead = low_pass(np.ascontiguousarray(values[::-1]), keep, 1.0, 0.0)[::-1]
     return low_pass(values, keep, 1.0, 0.0) + ahead - values
 
