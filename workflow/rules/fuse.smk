@@ -37,7 +37,7 @@ rule fuse:
     benchmark:
         "results/benchmarks/{dataset}/{recording}/{axis}/fuse.tsv"
     resources:
-        mem_mb=1500,
+        mem_mb=2500,
         runtime=60,
     params:
         options=stage(
