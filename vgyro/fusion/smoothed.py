@@ -24,6 +24,8 @@ from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, smooth
 
 SLOW_BESIDE_POLE = 0.5
 """The sensor's pole is undone where the smoother's bandwidth is below this share of the pole's frequency."""
+MEAN_HALF_POWER = 0.443
+"""-3 dB bandwidth of a mean over T, times T: sin(πx)/(πx) = 1/√2."""
 REST_NOTE = "at rest as a whole: a fixed bandwidth, forward and back"
 
 
@@ -137,17 +139,24 @@ def smoothed(array: ArrayRates, parameters: FilterParameters, signal: Signal) ->
             notes.append(f"the sensor's pole at {1.0 / (2.0 * math.pi * lead_s):.3g} Hz is undone")
         else:
             lead_s = 0.0
+    seconds = max(part.stop - part.start for part in array.stretches()) * array.period
     return Fused(
         rate,
         signal.weights,
         dc_gain=1.0,
-        bandwidth_hz=result.bandwidth_hz,
-        noise_bandwidth_hz=result.noise_bandwidth_hz,
+        # Nothing is smoothed over more than a stretch.
+        bandwidth_hz=not_below(result.bandwidth_hz, MEAN_HALF_POWER / seconds),
+        noise_bandwidth_hz=not_below(result.noise_bandwidth_hz, 0.5 / seconds),
         delay_s=-lead_s,
         note="; ".join(note for note in notes if note),
-        passes=result.passes,
+        passes=result.passes if result.bandwidth_hz > MEAN_HALF_POWER / seconds else 0,
         sd=sd,
     )
+
+
+def not_below(value: float, least: float) -> float:
+    """The greater of both; NaN stays."""
+    return value if math.isnan(value) else max(value, least)
 
 
 def pole_time(colour: float, period: float) -> float:
