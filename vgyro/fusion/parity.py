@@ -131,7 +131,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
             found = resting_noise(
                 block_moments(array, own=True), constant, correlation, block_s, parameters.engine
             )  # fmt: skip
-            moving = found.correlation
+            correlation, moving = found.correlation, found.moving
         else:
             found = changing_variances(moments, constant, outlier, correlation, block_s, parameters.engine)
         variance, tau = found.variance, np.array([memory.tau_s for memory in found.memories])

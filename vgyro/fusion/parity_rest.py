@@ -35,13 +35,14 @@ class Resting:
     """Noise of an array at rest.
 
     variance [M, N] : (deg/s)² a sample;  memories [N] : what each is an average over
-    correlation [M, N, N] : of the blocks; None: the same all the time;  tau_s : its time constant
+    correlation [N, N] : the same all the time, or about the mean
+    moving [M, N, N] : that of each block; None: the same all the time
     """
 
     variance: np.ndarray
     memories: list[Memory]
-    correlation: np.ndarray | None
-    tau_s: float
+    correlation: np.ndarray
+    moving: np.ndarray | None
 
 
 def resting_noise(
@@ -53,7 +54,7 @@ def resting_noise(
     constant [N] : (deg/s)², of a gyro of which no block is known;  correlation [N, N] : the constant one
     Time constants and change points are those that predict each block best from the others (see parity_memory); that
     of the correlation by the Gaussian deviance Σ ν·(log|C| + tr C⁻¹Z) of the standardised second moments Z. Beside the
-    constant correlation it pays 2·log(Σν).
+    constant correlation it pays 2·log(Σν), and a mean of this recording log(Σν) for each pair.
     """
     low_pass = engines.get(engine).kalman.low_pass
     known = ~moments.excluded
@@ -74,10 +75,11 @@ def resting_noise(
     sigma = np.sqrt(variance)
     standard = square / (sigma[:, :, None] * sigma[:, None, :])
     both = good[:, :, None] & good[:, None, :]
-    standard = np.where(both, standard, correlation)
     share = float(np.mean([effective_share(*one) for one in columns if one[1].any()] or [1.0]))
-    changing, tau = _moving(standard, moments.size * share, correlation, block_s, low_pass)
-    return Resting(variance, memories, changing, tau)
+    count = moments.size * share
+    correlation = _constant(standard, count, both, correlation)
+    standard = np.where(both, standard, correlation)
+    return Resting(variance, memories, correlation, _moving(standard, count, correlation, block_s, low_pass))
 
 
 def _less_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
@@ -95,10 +97,24 @@ def _less_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
     return less / (kept[:, :, None] * kept[:, None, :])
 
 
+def _constant(standard: np.ndarray, freedom: np.ndarray, both: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """The given correlation [N, N], or the mean of this recording, where that pays; both [M, N, N]: pairs to use."""
+    rows = both.all(axis=(1, 2))
+    total = float(freedom[rows].sum())
+    if total < FEWEST_SAMPLES * len(given):
+        return given
+    mean = np.einsum("b,bij->ij", freedom[rows], standard[rows]) / total
+    sigma = np.sqrt(np.maximum(np.diag(mean), np.finfo(float).tiny))
+    own = mean / np.outer(sigma, sigma)
+    pairs = len(given) * (len(given) - 1) / 2
+    scores = [_deviance(mean[None], np.array([total]), one[None]) for one in (given, own)]
+    return own if scores[1] + pairs * math.log(total) < scores[0] else given
+
+
 def _moving(
     standard: np.ndarray, freedom: np.ndarray, constant: np.ndarray, block_s: float, low_pass: LowPass
-) -> tuple[np.ndarray | None, float]:
-    """Correlation [M, N, N] that predicts best, and its time constant; None, infinite: the constant one.
+) -> np.ndarray | None:
+    """Correlation [M, N, N] that predicts best; None: the constant one.
 
     standard [M, N, N] : second moments of rates over their s.d.;  freedom [M] : independent samples of each block
     """
@@ -114,8 +130,8 @@ def _moving(
         if score < least:
             best, least = tau, score
     if math.isinf(best):
-        return None, best
-    return _average(standard, freedom, math.exp(-block_s / best), low_pass, slice(None), alone=False), best
+        return None
+    return _average(standard, freedom, math.exp(-block_s / best), low_pass, slice(None), alone=False)
 
 
 def _average(
