@@ -12,6 +12,7 @@ from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.slow import combined_without, slow_errors, slow_variance
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_model import Evidence, Walk, log_likelihood
+from vgyro.fusion.slow_prior import Prior
 from vgyro.fusion.slow_smoother import run_filters
 
 MOVING = FilterParameters(in_motion=True)
@@ -19,6 +20,8 @@ ARW = np.array([0.02, 0.05, 0.03, 0.04])
 RRW = np.array([0.003, 0.0, 0.01, 0.002])
 CORRELATION = 0.75 * np.eye(4) + 0.25
 RATE_HZ, SAMPLES = 4.0, 250
+BIASES, SLOPES = np.array([0.02, 0.05, 0.1, 0.03]), np.array([0.01, 0.04, 0.02, 0.03])
+"""Variances beforehand, (deg/s)² and (deg/s/K)²."""
 
 
 @pytest.fixture
@@ -78,6 +81,12 @@ def variances(array, blocks):
     return array.noise.arw**2 * array.rate_hz * np.where(np.arange(len(blocks)) % 3 == 0, 2.0, 1.0)[:, None]
 
 
+def one_prior(evidence, filtered):
+    """A prior of one part."""
+    slopes = SLOPES if evidence.has_slopes else []
+    return Prior(np.ones(1), np.concatenate([BIASES, evidence.steps, slopes])[None])
+
+
 def dense(array, blocks, variance, prior, slopes, tau=np.inf):
     """Joint prior covariance [BN, BN] of the biases; measured combinations M [m, BN], their values, noise covariance.
 
@@ -122,17 +131,18 @@ def dense(array, blocks, variance, prior, slopes, tau=np.inf):
 
 @pytest.mark.parametrize("tau", [np.inf, 15.0])
 @pytest.mark.parametrize("change", [plain, anchored, faulty, warm, gapped, everything])
-def test_against_the_dense_posterior(recording, change, tau):
-    # Expected: the joint Gaussian of all biases, conditioned on all differences and anchors at once.
+def test_against_the_dense_posterior(recording, change, tau, monkeypatch):
+    # Expected: the joint Gaussian of all biases, conditioned on all differences and anchors at once, for one prior.
+    monkeypatch.setattr("vgyro.fusion.slow.empirical_prior", one_prior)
     array = change(recording)
     blocks = SlowBlocks.of(array)
     variance = variances(array, blocks)
     slow = slow_errors(array, MOVING, variance, blocks=blocks, walk=Walk(RRW, tau))
     assert (slow.temperature is not None) == (change in (warm, everything))
     assert slow.anchored == (change in (anchored, everything))
-    before, measure, values, noise = dense(
-        array, blocks, variance, slow.constants.prior, slow.temperature is not None, tau
-    )
+    steps = [event.size**2 for event in array.faults if event.kind == "drift"]
+    prior = np.concatenate([BIASES, steps, SLOPES])
+    before, measure, values, noise = dense(array, blocks, variance, prior, slow.temperature is not None, tau)
     gain = np.linalg.solve(measure @ before @ measure.T + noise, measure @ before).T
     after = before - gain @ measure @ before
     number, gyros = slow.bias.shape

@@ -16,7 +16,8 @@ from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_choice import Choice, choose
-from vgyro.fusion.slow_model import Constants, Evidence, Walk, empirical_prior, posterior, with_shared_slope
+from vgyro.fusion.slow_model import Constants, Evidence, Walk, with_shared_slope
+from vgyro.fusion.slow_prior import empirical_prior
 from vgyro.fusion.slow_smoother import run_smoother
 from vgyro.units import rrw_deg_h_rt_h
 
@@ -103,18 +104,25 @@ def slow_errors(
     relative = None if degrees is None else degrees - centre
     evidence = Evidence.of(array, blocks, variance, noise, resting, relative)
     choice = choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk)
-    constants = posterior(choice.filtered, empirical_prior(evidence, choice.filtered))
+    constants = empirical_prior(evidence, choice.filtered).posterior(choice.filtered)
     state, covariance = run_smoother(choice.information, choice.filtered)
+    design = evidence.of_biases
     constant_rate = choice.slopes and bool(array.at_rest.all())
     if constant_rate:
-        so_far, _ = _with_constants(state, covariance, constants, evidence.design)
+        so_far, _ = _with_constants(state, covariance, constants, design)
         constants = with_shared_slope(evidence, choice.walk, so_far, constants)
-    bias, covariance = _with_constants(state, covariance, constants, evidence.design)
+    bias, covariance = _with_constants(state, covariance, constants, design)
     slopes = slice(evidence.plain, None)
     warming = (
         Temperature(constants.mean[slopes], constants.covariance[slopes, slopes], centre) if choice.slopes else None
     )
-    parts = (why, why_not, _of_walk(array, choice.walk), _of_temperature(choice, evidence.anchored, constant_rate))
+    parts = (
+        why,
+        why_not,
+        _of_scale(evidence, constants),
+        _of_walk(array, choice.walk),
+        _of_temperature(choice, evidence.anchored, constant_rate),
+    )
     note = "; ".join(filter(None, parts))
     return SlowErrors(blocks, bias, covariance, evidence.anchored, warming, choice.walk, constants, note)
 
@@ -130,7 +138,7 @@ def _usual_arw(variance: np.ndarray, array: ArrayRates) -> np.ndarray:
 def _with_constants(
     state: np.ndarray, covariance: np.ndarray, constants: Constants, design: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Biases [B, N] and their covariance: b = walk of the measurement + (D - walk of the regressors D)·β."""
+    """Biases [B, N] and their covariance: b = walk of the measurement + (D - walk of the regressors)·β, design D."""
     regressors = design[..., : len(constants.mean)] - state[..., 1:]
     bias = state[..., 0] + regressors @ constants.mean
     added = (regressors @ constants.covariance) @ regressors.transpose(0, 2, 1)
@@ -167,6 +175,13 @@ def _temperature(array: ArrayRates, parameters: FilterParameters, blocks: SlowBl
     if span <= LEAST_RANGE:
         return None, f"temperature within {span:.2g} K: not regressed on"
     return degrees, ""
+
+
+def _of_scale(evidence: Evidence, constants: Constants) -> str:
+    if not evidence.scales:
+        return ""
+    found = constants.mean[evidence.plain - evidence.scales : evidence.plain]
+    return f"scale errors of {100.0 * float(np.std(found)):.2g} % between gyros are told from biases, and left in"
 
 
 def _of_walk(array: ArrayRates, walk: Walk) -> str:

@@ -11,7 +11,8 @@ from itertools import product
 import numpy as np
 
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_model import Evidence, Walk, empirical_prior, log_likelihood, log_likelihood_slope
+from vgyro.fusion.slow_model import Evidence, Walk, log_likelihood, log_likelihood_slope
+from vgyro.fusion.slow_prior import empirical_prior
 from vgyro.fusion.slow_smoother import Filtered, Information
 
 MOST_BLOCKS, WINDOWS = 1000, 5
@@ -102,7 +103,7 @@ class _Search:
         information = part.information().merged(first)
         taus = [duration / one for one in FADING if duration / one > SHORTEST * block_s]
         still = part.filtered(information.first_regressors(evidence.plain), Walk(given))
-        spread = BROAD * float(empirical_prior(part, still)[: len(rrw)].max())
+        spread = BROAD * empirical_prior(part, still).spread(slice(0, len(rrw)))
         return cls(part, information, given, bounds, taus, np.concatenate([np.full(len(rrw), spread), evidence.steps]))
 
     def best(self, slopes: bool) -> Walk:

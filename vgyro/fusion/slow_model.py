@@ -17,14 +17,8 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.slow_blocks import SlowBlocks
+from vgyro.fusion.slow_scale import scale_variance
 from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filters
-
-FREEDOM = 2.0
-"""Degrees of freedom ν of the biases' Student distribution. Above N - 2 one gyro however far off is believed
-as much as the rest: its likelihood falls by d^-(ν+1), that of N - 1 wider biases by d^-(N-1)."""
-STEPS, SETTLED = 500, 1e-9
-LEAST = 1.0
-"""Least variance of the constants beforehand, in that with which one is measured: an estimate may vanish by chance."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +48,10 @@ class Evidence:
 
     means  : [B, N], deg/s, less `shared` [B], their mean where the board may move
     weight : G [B, N, N];  total : R⁻¹1 [B, N];  time : [B] s
-    design : D [B, N, k] of the constants: the N biases, E steps after faults, and the N temperature slopes if any
-    steps  : [E], (deg/s)², variances of the steps beforehand
+    design : D [B, N, k] of the constants: the N biases, E steps after faults and the N scale errors if they show, and
+             the N temperature slopes if any
+    steps  : variances beforehand of the steps, (deg/s)², and of the scale errors
+    scales : number of the scale errors, N or 0
     walks  : correlation [N, N] of the random walks
     anchored : standstill makes the common part seen in some of the blocks
     """
@@ -67,6 +63,7 @@ class Evidence:
     time: np.ndarray
     design: np.ndarray
     steps: np.ndarray
+    scales: int
     walks: np.ndarray
     anchored: bool
 
@@ -97,10 +94,23 @@ class Evidence:
         shared = np.where(resting, 0.0, means.mean(axis=1))
         means -= shared[:, None]
         steps = blocks.steps(array)
-        design = _design(len(blocks), means.shape[1], steps, temperature)
-        sizes = np.array([size**2 for _, _, size in steps])
+        rate = np.where(parity, shared + np.sum(total * means, axis=1) / np.where(parity, total.sum(axis=1), 1.0), 0.0)
+        same = (np.diff(blocks.stretch) == 0) & parity[1:] & parity[:-1] & ~array.at_rest.all()
+        scale = scale_variance(means, weight, total, np.flatnonzero(same) + 1, rate)
+        scales = means.shape[1] if scale > 0 else 0
+        design = _design(len(blocks), means.shape[1], steps, rate if scales else None, temperature)
+        sizes = np.array([size**2 for _, _, size in steps] + [scale] * scales)
         return cls(
-            means, shared, weight, total, blocks.time, design, sizes, array.noise.correlation, bool(resting.any())
+            means,
+            shared,
+            weight,
+            total,
+            blocks.time,
+            design,
+            sizes,
+            scales,
+            array.noise.correlation,
+            bool(resting.any()),
         )
 
     @property
@@ -110,13 +120,20 @@ class Evidence:
 
     @property
     def plain(self) -> int:
-        """Constants without the temperature slopes, N + E."""
+        """Constants without the temperature slopes."""
         return self.gyros + len(self.steps)
 
     @property
     def has_slopes(self) -> bool:
         """Temperature slopes are among the constants."""
         return self.design.shape[2] > self.plain
+
+    @property
+    def of_biases(self) -> np.ndarray:
+        """Regressors [B, N, k] of the biases: D without the scale errors, for these are none."""
+        design = self.design.copy()
+        design[..., self.plain - self.scales : self.plain] = 0.0
+        return design
 
     def part(self, kept: np.ndarray) -> Evidence:
         """Some of the blocks, by their numbers, increasing: the others are as if they had not been measured."""
@@ -146,7 +163,8 @@ class Evidence:
 
     def _cleared(self, filtered: Filtered) -> Filtered:
         squares = filtered.squares.copy()
-        for start in () if self.anchored else (1, 1 + self.plain):
+        starts = () if self.anchored else (1, 1 + self.plain)
+        for start in (*starts, 1 + self.plain - self.scales) if self.scales else starts:
             rows = slice(start, start + self.gyros)
             if start < len(squares):
                 squares[rows] -= squares[rows].mean(axis=0)
@@ -156,16 +174,22 @@ class Evidence:
         return replace(filtered, squares=squares)
 
 
-def _design(blocks: int, gyros: int, steps: list[tuple[int, int, float]], temperature: np.ndarray | None) -> np.ndarray:
-    """Regressors [B, N, k] of the biases' constants."""
-    slopes = 0 if temperature is None else gyros
-    design = np.zeros((blocks, gyros, gyros + len(steps) + slopes))
+def _design(
+    blocks: int,
+    gyros: int,
+    steps: list[tuple[int, int, float]],
+    rate: np.ndarray | None,
+    temperature: np.ndarray | None,
+) -> np.ndarray:
+    """Regressors [B, N, k] of the constants: what each gyro follows comes after the biases and steps."""
+    followed = [one for one in (rate, temperature) if one is not None]
+    design = np.zeros((blocks, gyros, gyros + len(steps) + gyros * len(followed)))
     each = np.arange(gyros)
     design[:, each, each] = 1.0
     for number, (back, gyro, _) in enumerate(steps):
         design[back:, gyro, gyros + number] = 1.0
-    if temperature is not None:
-        design[:, each, gyros + len(steps) + each] = temperature[:, None]
+    for number, one in enumerate(followed, start=1):
+        design[:, each, number * gyros + len(steps) + each] = one[:, None]
     return design
 
 
@@ -190,12 +214,11 @@ def _inverse_covariance(used: np.ndarray, variance: np.ndarray, correlation: np.
 class Constants:
     """Posterior of the constants β: biases [N] and steps [E], deg/s, then temperature slopes [N], deg/s/K.
 
-    mean [k], covariance [k, k];  prior [k], variances beforehand, of mean 0
+    mean [k], covariance [k, k]
     """
 
     mean: np.ndarray
     covariance: np.ndarray
-    prior: np.ndarray
 
 
 def posterior(filtered: Filtered, prior: np.ndarray) -> Constants:
@@ -204,7 +227,7 @@ def posterior(filtered: Filtered, prior: np.ndarray) -> Constants:
     root = np.sqrt(prior)
     inside = np.linalg.inv(np.eye(len(prior)) + root[:, None] * seen * root)
     covariance = root[:, None] * (inside + inside.T) / 2 * root
-    return Constants(covariance @ score, covariance, prior)
+    return Constants(covariance @ score, covariance)
 
 
 def log_likelihood(filtered: Filtered, prior: np.ndarray) -> float:
@@ -237,48 +260,6 @@ def log_likelihood_slope(
     return rrw * ((excess * evidence.walks) @ rrw)
 
 
-def empirical_prior(evidence: Evidence, filtered: Filtered) -> np.ndarray:
-    """Variances [k] of the constants beforehand, from their own spread: empirical Bayes.
-
-    Biases: independent Student variables about 0 with ν degrees of freedom, as normal ones of the variance s²/λ_i:
-    λ_i = (ν + 1)/(ν + E b_i²/s²), s² = mean λ_i·E b_i², again and again (an EM algorithm; E b_i² is that of the
-    posterior). What all share goes to the motion where nothing anchors it, so they are about their robust centre,
-    whose variance is 1/Σ(λ_i/s²). That is too small, for the information of a Student location is (ν + 1)/(ν + 3) of
-    that of its weights, and for s is known from N - 1 differences alone: the variances are enlarged by the inverse of
-    the former, and such that 1.96 standard deviations reach as far as the 95 % limits of a Student variable of N - 1
-    degrees of freedom.
-    Temperature slopes: independent normal variables of one variance, enlarged for the latter reason.
-    Lange, Little & Taylor (1989), J. Am. Stat. Assoc. 84, 881-896.
-    """
-    from scipy.stats import norm, t
-
-    gyros = evidence.gyros
-    seen = np.diag(filtered.squares)[1:]
-    slopes = len(seen) > evidence.plain
-    groups = [slice(0, gyros), slice(evidence.plain, None)][: 1 + slopes]
-    # Begins wide: the squared estimate of each alone, or what one measurement of all would leave open.
-    open_variance = 1.0 / np.where(seen > 0, seen, 1.0)
-    alone = np.maximum((filtered.squares[1:, 0] * open_variance) ** 2, open_variance)
-    size = np.array([alone[group].mean() for group in groups])
-    least = LEAST * np.array([open_variance[group].mean() for group in groups])
-    share = np.ones((len(groups), gyros))
-
-    def prior(enlarged: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
-        sizes = size[:, None] / share * np.array(enlarged)[: len(groups), None]
-        return np.concatenate([sizes[0], evidence.steps, *sizes[1:]])
-
-    for _ in range(STEPS):
-        found = posterior(filtered, prior())
-        second = found.mean**2 + np.diag(found.covariance)
-        second = np.stack([second[group] for group in groups])
-        share[0] = (FREEDOM + 1) / (FREEDOM + second[0] / size[0])
-        before, size = size, np.maximum((share * second).mean(axis=1), least)
-        if np.all(np.abs(size - before) <= SETTLED * before):
-            break
-    few = float(t.ppf(0.975, max(gyros - 1, 1)) / norm.ppf(0.975)) ** 2
-    return prior((few * (FREEDOM + 3) / (FREEDOM + 1), few))
-
-
 def with_shared_slope(evidence: Evidence, walk: Walk, bias: np.ndarray, constants: Constants) -> Constants:
     """The constants with what a rate that is one constant throughout says of the temperature slope that all share.
 
@@ -305,4 +286,4 @@ def with_shared_slope(evidence: Evidence, walk: Walk, bias: np.ndarray, constant
     known = constants.covariance @ along
     gain = known / (along @ known + 1.0 / seen)
     covariance = constants.covariance - np.outer(gain, known)
-    return Constants(constants.mean + gain * (score / seen), covariance, constants.prior)
+    return Constants(constants.mean + gain * (score / seen), covariance)

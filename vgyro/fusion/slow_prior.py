@@ -1,0 +1,168 @@
+"""What is known of the constants beforehand, from their own spread: hierarchical Bayes.
+
+The biases of healthy gyros are normal variables about one centre, of one standard deviation s that is not known, with
+the prior density 1/s; a few gyros may be far off. What all share goes to the motion where nothing anchors it, so the
+common bias is as well known as the mean of the healthy ones: their spread says how well, not the noise of the means.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from vgyro.fusion.slow_model import Constants, Evidence
+from vgyro.fusion.slow_smoother import Filtered
+
+FAR_OFF = 0.003
+"""Share of gyros whose bias has nothing to do with the spread of the rest."""
+CANDIDATES, MOST_FAR_OFF = 6, 3
+"""Gyros that may be far off, those farthest from the median, how many at once; less than half in any case."""
+LEAST, LARGEST, FINENESS = 0.4, 5.0, 0.5
+"""s begins at this part of the s.d. with which one constant is measured, ends at this multiple of the largest
+constant, and goes in steps of this in its logarithm. Spreads below a measurement's s.d. are not told apart."""
+OPEN = 1e4
+"""Variance of the constants, of the largest square seen, for a first look at them."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A mixture of M priors of the constants, each of independent normal variables of mean 0.
+
+    share [M], Σ = 1, posterior;  variance [M, k]
+    """
+
+    share: np.ndarray
+    variance: np.ndarray
+
+    def spread(self, constants: slice) -> float:
+        """Largest mean variance of some of the constants."""
+        return float((self.share @ self.variance)[constants].max())
+
+    def posterior(self, filtered: Filtered) -> Constants:
+        """Mean and covariance of the constants over the mixture."""
+        means, covariances, _ = _posteriors(filtered, self.variance)
+        mean = self.share @ means
+        apart = means - mean
+        covariance = np.tensordot(self.share, covariances, axes=1) + (apart.T * self.share) @ apart
+        return Constants(mean, covariance)
+
+
+def empirical_prior(evidence: Evidence, filtered: Filtered) -> Prior:
+    """The mixture over s and over which gyros are far off, each weighed by the likelihood of the blocks.
+
+    far off : a normal variable of the variance of the gyro's own square, which costs FAR_OFF
+    The posterior of s under 1/s makes the variance of the centre such that error²/variance is 1 on average: that of the
+    mean of N normal variables, times (N - 1)/(N - 3). Temperature slopes: one variance, its posterior mean likewise.
+    Gelman et al. (2013), Bayesian Data Analysis, ch. 5 (hierarchical normal model).
+    """
+    gyros = evidence.gyros
+    groups = [slice(0, gyros)]
+    if len(filtered.squares) > 1 + evidence.plain:
+        groups.append(slice(evidence.plain, None))
+    looks = [_Look.of(filtered, group) for group in groups]
+    open_wide = [np.full(gyros, look.open_wide) for look in looks]
+    slopes: list[np.ndarray] = []
+    if len(groups) > 1:
+
+        def with_slopes(variance: np.ndarray) -> np.ndarray:
+            return np.concatenate([open_wide[0], evidence.steps, variance])
+
+        slope_sizes = [np.full(gyros, size) for size in looks[1].sizes()]
+        slopes = [
+            np.full(gyros, _weighed(filtered, slope_sizes, np.zeros(len(slope_sizes)), with_slopes).spread(groups[1]))
+        ]
+
+    def with_biases(variance: np.ndarray) -> np.ndarray:
+        return np.concatenate([variance, evidence.steps, *slopes])
+
+    variances, logarithms = looks[0].with_far_off()
+    return _weighed(filtered, variances, logarithms, with_biases)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A first look at N constants of one kind, with a prior that is wide open.
+
+    square [N] : square of what each is about the median, and its variance;  sure [N] : its variance if alone
+    farthest : those that may be far off, the farthest first;  open_wide : variance of the wide prior
+    """
+
+    square: np.ndarray
+    sure: np.ndarray
+    farthest: list[int]
+    open_wide: float
+
+    @classmethod
+    def of(cls, filtered: Filtered, group: slice) -> _Look:
+        diagonal = np.diag(filtered.squares)[1:]
+        inside = diagonal[group] > 0
+        if not inside.any():
+            return cls(np.ones(len(inside)), np.ones(len(inside)), [], 1.0)
+        sure = 1.0 / np.where(diagonal > 0, diagonal, np.inf)
+        alone = (filtered.squares[1:, 0] * sure) ** 2
+        open_wide = OPEN * np.maximum(alone, sure)
+        open_wide[group] = open_wide[group].max()
+        means, covariances, _ = _posteriors(filtered, open_wide[None])
+        mean, covariance = means[0, group], covariances[0][group, group]
+        centred = np.eye(len(mean)) - inside / inside.sum()
+        apart = mean - np.median(mean[inside])
+        own = np.diag(centred @ covariance @ centred.T)
+        usual = np.median(apart[inside] ** 2)
+        order = np.argsort(np.where(inside, -(apart**2) / (own + usual), np.inf), kind="stable")
+        farthest = order[: min(CANDIDATES, int(inside.sum()))].tolist()
+        square = np.where(inside, apart**2 + own, usual)
+        return cls(
+            square,
+            np.where(inside, sure[group], np.median(sure[group][inside])),
+            farthest,
+            float(open_wide[group].max()),
+        )
+
+    def sizes(self) -> np.ndarray:
+        """Variances s², evenly in the logarithm."""
+        low = LEAST * math.sqrt(float(np.median(self.sure)))
+        high = max(LARGEST * math.sqrt(float(self.square.max())), low)
+        return np.geomspace(low, high, math.ceil(math.log(high / low) / FINENESS) + 1) ** 2
+
+    def with_far_off(self) -> tuple[list[np.ndarray], np.ndarray]:
+        """Variances [N] of each s and each set of gyros far off, and the logarithm of what the set has beforehand."""
+        most = min(MOST_FAR_OFF, (len(self.square) - 1) // 2, len(self.farthest))
+        sets = [one for number in range(most + 1) for one in combinations(self.farthest, number)]
+        variances, logarithms = [], []
+        for far in sets:
+            off = np.isin(np.arange(len(self.square)), far)
+            for size in self.sizes():
+                variances.append(np.where(off, np.maximum(self.square, size), size))
+                logarithms.append(len(far) * math.log(FAR_OFF / (1.0 - FAR_OFF)))
+        return variances, np.array(logarithms)
+
+
+def _weighed(
+    filtered: Filtered,
+    variances: list[np.ndarray],
+    logarithms: np.ndarray,
+    complete: Callable[[np.ndarray], np.ndarray],
+) -> Prior:
+    """The mixture of priors whose shares are the posterior ones.
+
+    logarithms [M] : of the shares beforehand;  complete : variances of one kind → those of all constants [k]
+    """
+    every = np.stack([complete(one) for one in variances])
+    found = logarithms + _posteriors(filtered, every)[2]
+    share = np.exp(found - found.max())
+    return Prior(share / share.sum(), every)
+
+
+def _posteriors(filtered: Filtered, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means [M, k], covariances [M, k, k] and log likelihoods [M] (less one constant) with M priors [M, k]."""
+    seen, score = filtered.squares[1:, 1:], filtered.squares[1:, 0]
+    root = np.sqrt(variance)
+    matrix = np.eye(len(score)) + root[:, :, None] * seen * root[:, None, :]
+    inside = np.linalg.inv(matrix)
+    covariance = root[:, :, None] * (inside + inside.transpose(0, 2, 1)) / 2 * root[:, None, :]
+    means = covariance @ score
+    return means, covariance, 0.5 * (means @ score - np.linalg.slogdet(matrix)[1])
