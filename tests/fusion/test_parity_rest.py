@@ -129,3 +129,13 @@ def test_a_gyro_at_fault_has_no_weight_and_spoils_no_correlation():
     best = min_variance_weights(truth)
     ours, oracle = (np.einsum("bi,bij,bj->b", one, truth, one).mean() for one in (weights, best))
     assert ours < 1.01 * oracle
+
+
+def test_two_outputs_of_one_gyro():
+    # Closed form: two of the same and two others, alike: 1/3 for the pair, 1/3 for each of the others.
+    truth = np.eye(4)
+    mixing = np.broadcast_to(np.eye(4), (40_000, 4, 4))
+    array = resting(40_000, mixing, 6, correlation=truth)
+    array.rate[:, 1] = array.rate[:, 0]
+    weights = parity_variances(array, FilterParameters()).weights()
+    np.testing.assert_allclose(weights[:, :2].sum(axis=1), 1 / 3, atol=0.02)

@@ -105,12 +105,13 @@ class Variances:
 def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: bool = True) -> Variances:
     """Variances of the gyros' noise from the residuals against the array's own estimate, which know no motion.
 
+    At rest as a whole those that change are of the rates themselves, and their correlation may change as well.
     changing : False gives constant variances. Otherwise each is a two-sided EWMA over blocks, or constant between
                change points, or both; time constant and change points are those that predict each block best from the
                others, gyro by gyro, and must pay for themselves, so that white noise keeps a constant variance
     returns  : Variances; faults of the array and stuck gyros are left out
     raises   : CannotRun for one gyro, or fewer than 16 blocks (of 0.25 s; of a sample below 8 Hz) without fault
-    Two gyros cannot be told apart: each has half the variance of their difference.
+    Two gyros cannot be told apart by parity: each has half the variance of their difference.
     """
     gyros = array.rate.shape[1]
     if gyros < 2:
@@ -137,7 +138,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
         variance, tau = found.variance, np.array([memory.tau_s for memory in found.memories])
         changes = np.array([len(memory.points) for memory in found.memories])
     phi = colour(array, moments, constant)
-    note = _note(moments, correlation, gyros)
+    note = _note(moments, correlation, gyros, changing and bool(array.at_rest.all()), moving)
     return Variances(
         moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note, moving
     )  # fmt: skip
@@ -151,12 +152,18 @@ def _correlation(array: ArrayRates) -> np.ndarray:
     return measured if np.linalg.eigvalsh(measured)[0] >= SMALLEST_EIGENVALUE else np.eye(len(measured))
 
 
-def _note(moments: BlockMoments, correlation: np.ndarray, gyros: int) -> str:
-    notes = ["noise common to all gyros is in no difference between them"]
-    if np.array_equal(correlation, np.eye(gyros)):
-        notes[0] += ", and their correlation is taken as none"
-    if gyros == 2:
-        notes.append("two gyros cannot be told apart: equal shares")
+def _note(
+    moments: BlockMoments, correlation: np.ndarray, gyros: int, resting: bool, moving: np.ndarray | None
+) -> str:  # fmt: skip
+    if resting:
+        notes = ["at rest as a whole: noise of the rates themselves"]
+        notes += ["their correlation changes"] if moving is not None else []
+    else:
+        notes = ["noise common to all gyros is in no difference between them"]
+        if np.array_equal(correlation, np.eye(gyros)):
+            notes[0] += ", and their correlation is taken as none"
+        if gyros == 2:
+            notes.append("two gyros cannot be told apart: equal shares")
     size = moments.size
     none = float(size[moments.excluded.all(axis=1)].sum() / size.sum())
     if none > 0:

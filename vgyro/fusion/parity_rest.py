@@ -28,6 +28,8 @@ SCORED = 1 << 15
 """A memory of the correlation is scored at no more blocks than these, evenly spaced."""
 FEWEST_SAMPLES = 8
 """Samples per gyro that a correlation must be known from, at least."""
+LEAST_EIGENVALUE = 1e-3
+"""Correlations are drawn so far toward none: a matrix of a smaller eigenvalue is too near to singular to weight by."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def _constant(standard: np.ndarray, freedom: np.ndarray, both: np.ndarray, given
         return given
     mean = np.einsum("b,bij->ij", freedom[rows], standard[rows]) / total
     sigma = np.sqrt(np.maximum(np.diag(mean), np.finfo(float).tiny))
-    own = mean / np.outer(sigma, sigma)
+    own = _regular(mean / np.outer(sigma, sigma))
     pairs = len(given) * (len(given) - 1) / 2
     scores = [_deviance(mean[None], np.array([total]), one[None]) for one in (given, own)]
     return own if scores[1] + pairs * math.log(total) < scores[0] else given
@@ -125,13 +127,13 @@ def _moving(
         keep = math.exp(-block_s / tau)
         if tau < FEWEST_BLOCKS * block_s or 2.0 * float(np.median(freedom)) / (1.0 - keep) < FEWEST_SAMPLES * gyros:
             continue
-        alone = _average(standard, freedom, keep, low_pass, rows, alone=True)
+        alone = _regular(_average(standard, freedom, keep, low_pass, rows, alone=True))
         score = _deviance(standard[rows], freedom[rows], alone) + price
         if score < least:
             best, least = tau, score
     if math.isinf(best):
         return None
-    return _average(standard, freedom, math.exp(-block_s / best), low_pass, slice(None), alone=False)
+    return _regular(_average(standard, freedom, math.exp(-block_s / best), low_pass, slice(None), alone=False))
 
 
 def _average(
@@ -147,6 +149,14 @@ def _average(
             result[:, one, other] = result[:, other, one] = (around - total if alone else around)[rows]
     sigma = np.sqrt(np.maximum(np.einsum("bii->bi", result), np.finfo(float).tiny))
     return result / (sigma[:, :, None] * sigma[:, None, :])
+
+
+def _regular(correlation: np.ndarray) -> np.ndarray:
+    """Correlations [..., N, N] whose eigenvalues are LEAST_EIGENVALUE or more; in place."""
+    correlation *= 1.0 - LEAST_EIGENVALUE
+    each = np.arange(correlation.shape[-1])
+    correlation[..., each, each] = 1.0
+    return correlation
 
 
 def _deviance(standard: np.ndarray, freedom: np.ndarray, correlation: np.ndarray) -> float:
