@@ -11,7 +11,7 @@ from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.slow import combined_without, slow_errors, slow_variance
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_model import Evidence, Walk, log_likelihood
+from vgyro.fusion.slow_model import Evidence, Walk, log_likelihood, posterior
 from vgyro.fusion.slow_prior import Prior
 from vgyro.fusion.slow_smoother import run_filters
 
@@ -81,7 +81,7 @@ def variances(array, blocks):
     return array.noise.arw**2 * array.rate_hz * np.where(np.arange(len(blocks)) % 3 == 0, 2.0, 1.0)[:, None]
 
 
-def one_prior(evidence, filtered):
+def one_prior(evidence, _):
     """A prior of one part."""
     slopes = SLOPES if evidence.has_slopes else []
     return Prior(np.ones(1), np.concatenate([BIASES, evidence.steps, slopes])[None])
@@ -149,6 +149,21 @@ def test_against_the_dense_posterior(recording, change, tau, monkeypatch):
     marginal = after.reshape(number, gyros, number, gyros)[np.arange(number), :, np.arange(number), :]
     np.testing.assert_allclose(slow.bias, (gain @ values).reshape(number, gyros), atol=1e-8)
     np.testing.assert_allclose(slow.covariance, marginal, atol=1e-8 * marginal.max())
+
+
+def test_a_mixture_of_priors(recording):
+    # Expected: mean and covariance of the mixture of what each gives, by the law of total variance.
+    blocks = SlowBlocks.of(recording)
+    none = np.zeros(len(blocks), dtype=bool)
+    evidence = Evidence.of(recording, blocks, variances(recording, blocks), CORRELATION, none, None)
+    filtered = evidence.filtered(evidence.information(), Walk(RRW))
+    share, prior = np.array([0.2, 0.3, 0.5]), np.array([[0.1] * 4, [0.01, 0.02, 0.3, 0.01], [1.0, 2.0, 0.1, 4.0]])
+    each = [posterior(filtered, one) for one in prior]
+    mean = sum(part * one.mean for part, one in zip(share, each, strict=True))
+    second = sum(part * (one.covariance + np.outer(one.mean, one.mean)) for part, one in zip(share, each, strict=True))
+    found = Prior(share, prior).posterior(filtered)
+    np.testing.assert_allclose(found.mean, mean, atol=1e-12)
+    np.testing.assert_allclose(found.covariance, second - np.outer(mean, mean), atol=1e-12)
 
 
 @pytest.mark.parametrize("tau", [np.inf, 15.0])

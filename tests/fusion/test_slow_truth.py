@@ -166,6 +166,58 @@ def test_the_common_bias_lies_in_its_limits(simulated):
     assert np.mean(inside) == pytest.approx(0.95, abs=0.04)
 
 
+def common_bias(simulated, spread, seconds, off=0.0):
+    """error²/variance of the mean bias of the gyros that are not `off` [200], and the mean of its squared error.
+
+    Constant biases, white noise of 0.1 deg/s per second's mean, in 30 blocks.
+    """
+    arw, weights = np.full(6, 0.1 * np.sqrt(30 / seconds)), np.where(np.arange(6) == 3, off == 0, 1.0)
+    ratios, squares = [], []
+    for seed in range(200):
+        array, bias = simulated(30, seed, arw, np.zeros(6), spread)
+        far = off * (np.arange(6) == 3)
+        slow = slow_errors(replace(array, rate=array.rate + far), MOVING, arw**2, walk=Walk(np.zeros(6)))
+        error = (slow.bias[0] - bias[0] - far) @ weights / weights.sum()
+        squares.append(error**2)
+        ratios.append(error**2 / slow_variance(weights / weights.sum(), slow)[0])
+    return np.array(ratios), np.mean(squares)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seconds", [600, 3600])
+@pytest.mark.parametrize("spread", [0.005, 0.05, 0.5])
+def test_the_common_bias_is_as_large_as_stated(simulated, spread, seconds):
+    # Expected: NEES of 1 (0.8 to 1.2), within 1.96 s.d. in 95 % (binomial s.d. 1.5 %) of 200 recordings, whether the
+    # gyros' spread is above or below the noise of their means, 0.0041 and 0.0017 deg/s.
+    ratios, _ = common_bias(simulated, spread, seconds)
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.2 + 1.96 * np.std(ratios) / np.sqrt(200))
+    assert np.mean(ratios < 1.96**2) == pytest.approx(0.95, abs=0.04)
+
+
+@pytest.mark.full
+def test_the_common_bias_with_one_gyro_far_off(simulated):
+    # Expected: the error of five gyros alone, the spread over √5, and limits that hold. 200 recordings: an s.d. to 5 %.
+    ratios, square = common_bias(simulated, 0.005, 3600, off=1.0)
+    assert np.sqrt(square) == pytest.approx(0.005 / np.sqrt(5), rel=0.15)
+    assert np.mean(ratios < 1.96**2) > 0.9
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.01])
+def test_scale_errors_are_not_taken_for_biases(simulated, scale):
+    # Expected: the biases as they are known without motion of 20 deg/s r.m.s. about 0.4 Hz; 1 % of it is ten times the
+    # noise of a block.
+    shares = scale * np.array([1.0, -1.0, 0.5, -0.5, 1.5, -1.5])
+    array, bias = simulated(600, 3, np.full(6, 0.02), np.full(6, 2e-4))
+    motion = 28.0 * np.sin(np.arange(600) * 2.6)
+    turning = motion + 20.0 * np.sin(np.arange(600) / 3.0)
+    moved = replace(array, rate=array.rate + motion[:, None] + turning[:, None] * shares)
+    slow, still = (slow_errors(one, MOVING, np.full(6, 0.02) ** 2) for one in (moved, array))
+    assert ("scale errors of 1.1 % between gyros" in slow.note) == (scale > 0)
+    assert np.std((slow.bias - bias) @ EQUAL) < 0.004
+    np.testing.assert_allclose(slow.bias, still.bias, atol=1e-8 if scale == 0 else 0.004)
+    np.testing.assert_allclose(slow.covariance, still.covariance, rtol=0.2)
+
+
 def test_one_gyro_far_off_does_not_drag_the_rest(simulated):
     # Expected: the rate that the other five give without it, within their own s.d. of the common bias.
     array, bias = simulated(200, 2)

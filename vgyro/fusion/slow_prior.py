@@ -21,11 +21,14 @@ FAR_OFF = 0.003
 """Share of gyros whose bias has nothing to do with the spread of the rest."""
 CANDIDATES, MOST_FAR_OFF = 6, 3
 """Gyros that may be far off, those farthest from the median, how many at once; less than half in any case."""
-LEAST, LARGEST, FINENESS = 0.4, 5.0, 0.5
+LEAST, LARGEST, FINENESS = 0.5, 5.0, 0.5
 """s begins at this part of the s.d. with which one constant is measured, ends at this multiple of the largest
 constant, and goes in steps of this in its logarithm. Spreads below a measurement's s.d. are not told apart."""
 OPEN = 1e4
-"""Variance of the constants, of the largest square seen, for a first look at them."""
+"""Variance of the constants for a first look at them, of that with which each is measured: wide, but not so that
+rounding is taken for what all share."""
+WIDE = 100.0
+"""Variance of the biases while the slopes' is sought, of the largest square seen."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +88,10 @@ def empirical_prior(evidence: Evidence, filtered: Filtered) -> Prior:
 
 @dataclass(frozen=True)
 class _Look:
-    """A first look at N constants of one kind, with a prior that is wide open.
+    """A first look at N constants of one kind, with a wide prior.
 
     square [N] : square of what each is about the median, and its variance;  sure [N] : its variance if alone
-    farthest : those that may be far off, the farthest first;  open_wide : variance of the wide prior
+    farthest : those that may be far off, the farthest first;  open_wide : a wide variance
     """
 
     square: np.ndarray
@@ -104,9 +107,7 @@ class _Look:
             return cls(np.ones(len(inside)), np.ones(len(inside)), [], 1.0)
         sure = 1.0 / np.where(diagonal > 0, diagonal, np.inf)
         alone = (filtered.squares[1:, 0] * sure) ** 2
-        open_wide = OPEN * np.maximum(alone, sure)
-        open_wide[group] = open_wide[group].max()
-        means, covariances, _ = _posteriors(filtered, open_wide[None])
+        means, covariances, _ = _posteriors(filtered, OPEN * sure[None])
         mean, covariance = means[0, group], covariances[0][group, group]
         centred = np.eye(len(mean)) - inside / inside.sum()
         apart = mean - np.median(mean[inside])
@@ -119,7 +120,7 @@ class _Look:
             square,
             np.where(inside, sure[group], np.median(sure[group][inside])),
             farthest,
-            float(open_wide[group].max()),
+            WIDE * float(np.maximum(alone, sure)[group].max()),
         )
 
     def sizes(self) -> np.ndarray:
