@@ -63,8 +63,9 @@ def resting_noise(
     square = _less_slow(moments, known)
     own = np.maximum(np.einsum("bii->bi", square), 0.0)
     outlier = outliers(np.where(known, own, 0.0))
-    square = _less_slow(moments, known & ~outlier)
-    own = np.maximum(np.einsum("bii->bi", square), 0.0)
+    if outlier.any():
+        square = _less_slow(moments, known & ~outlier)
+        own = np.maximum(np.einsum("bii->bi", square), 0.0)
     good = known & ~outlier
     freedom = np.where(good, moments.size[:, None].astype(float), 0.0)
     columns = list(zip(own.T, freedom.T, strict=True))
@@ -74,13 +75,14 @@ def resting_noise(
     # An outlier has the variance that it shows, and lends it to no other block.
     least = np.maximum(LEAST_SHARE * float(np.median(constant)), np.where(outlier, own, 0.0))
     variance = np.maximum(variance, least)
-    sigma = np.sqrt(variance)
-    standard = square / (sigma[:, :, None] * sigma[:, None, :])
+    sigma, standard = np.sqrt(variance), square
+    standard /= sigma[:, :, None]
+    standard /= sigma[:, None, :]
     both = good[:, :, None] & good[:, None, :]
     share = float(np.mean([effective_share(*one) for one in columns if one[1].any()] or [1.0]))
     count = moments.size * share
     correlation = _constant(standard, count, both, correlation)
-    standard = np.where(both, standard, correlation)
+    np.copyto(standard, correlation, where=~both)
     return Resting(variance, memories, correlation, _moving(standard, count, correlation, block_s, low_pass))
 
 
@@ -92,11 +94,15 @@ def _less_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
     share = used * moments.size[:, None]
     mass = moments.window_sum(share)
     slow = np.where(mass > 0, moments.window_sum(share * moments.mean) / np.maximum(mass, 1.0), moments.mean)
-    cross = moments.mean[:, :, None] * slow[:, None, :]
-    size = moments.size[:, None, None]
-    less = moments.square / size - (cross + cross.transpose(0, 2, 1)) + slow[:, :, None] * slow[:, None, :]
+    # (m - s)(m - s)' - mm' = ss' - ms' - sm', in place: there is one matrix a block.
+    off = moments.mean - slow
+    less = moments.square / moments.size[:, None, None]
+    less -= moments.mean[:, :, None] * moments.mean[:, None, :]
+    less += off[:, :, None] * off[:, None, :]
     kept = np.sqrt(np.maximum(1.0 - 1.0 / np.maximum(mass, 2.0), 0.5))
-    return less / (kept[:, :, None] * kept[:, None, :])
+    less /= kept[:, :, None]
+    less /= kept[:, None, :]
+    return less
 
 
 def _constant(standard: np.ndarray, freedom: np.ndarray, both: np.ndarray, given: np.ndarray) -> np.ndarray:
