@@ -2,10 +2,14 @@
 
 The noise is that of config/twins/demo.yaml (white 6 deg/√h with GARCH and DCC, flicker 40 deg/h, random walk
 200 deg/h/√h, warm-up of 8 K), six gyros at 20 Hz. "σ" is the standard deviation of the mean of one second of a healthy
-gyro. The faults: step of 5 σ for 10 s or longer; drift that reaches 5 σ within 1 to 10 minutes; 2.5 times the noise for
-30 s or longer; a burst of 5 times the noise for 2 to 15 s; a change of the scale factor whose residual has an r.m.s. of
-5 σ in random motion of 20 deg/s up to 0.5 Hz, for 30 s or longer; one count repeated, or the count zero, for 2 s or
-more.
+gyro. The faults:
+step     5 σ for 10 s or longer
+drift    reaches 5 σ within 1 to 10 minutes and is gone at once then; so it ends with a step, the easier part to
+         find. lasting_drift has none
+noise    2.5 times the usual for 30 s or longer
+burst    5 times the usual noise for 2 to 15 s
+scale    the residual has an r.m.s. of 5 σ in random motion of 20 deg/s up to 0.5 Hz, for 30 s or longer
+stuck, dropout   one count repeated, or the count zero, for 2 s or more
 """
 
 from __future__ import annotations
@@ -93,6 +97,20 @@ def with_fault(kind: str, seed: int, motion: bool) -> Case:
         before = rate[np.flatnonzero(inside)[0] - 1, gyro]
         rate[inside, gyro] = before if kind == "stuck" else np.rint(-250.0 / COUNT) * COUNT
     return Case(rate, gyro, start, stop)
+
+
+def lasting_drift(seed: int, motion: bool, length: float, grows: bool) -> Case:
+    """A drift that reaches 5 σ in `length` seconds and never comes back: no step gives it away.
+
+    grows : it reaches them at the end of the recording; else it stays there for a minute or longer
+    """
+    array = healthy(1000 + seed, motion=motion)
+    rng = np.random.default_rng([seed, int(length)])
+    gyro, end, sign = int(rng.integers(GYROS)), float(array.time[-1]), rng.choice([-1.0, 1.0])
+    start = end - length if grows else float(rng.uniform(0.1, 1.0 - (length + 60.0) / end) * end)
+    rate = array.rate()
+    rate[:, gyro] += sign * SIGMAS * array.sigma[gyro] * np.clip((array.time - start) / length, 0.0, 1.0)
+    return Case(rate, gyro, start, end)
 
 
 def _added(kind: str, array: Healthy, gyro: int, since: np.ndarray, length: float, inside: Any, rng: Any) -> Any:

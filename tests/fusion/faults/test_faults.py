@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fault_cases import COUNT, KINDS, RATE_HZ, array_of, healthy, with_fault
+from fault_cases import COUNT, KINDS, RATE_HZ, array_of, healthy, lasting_drift, with_fault
 
 from vgyro.config import FaultOptions
 from vgyro.fusion.events import excluded
@@ -13,14 +13,21 @@ from vgyro.fusion.faults import find_faults, search_faults, sentence
 FOUND, ONSET_S = 0.95, 10.0
 DAY_S = 86400.0
 SAMPLE_S = 1.0 / RATE_HZ
+# Found of 200 (rest, motion), where 95 % are not reached. With the true flicker and random walk given, 59 of 60 and 60 of
+# 60 of those of 300 and 600 s that grow to the end were found: 20 minutes tell a gyro's own wander too roughly.
+REACHED = {(150.0, True): "92.5 %, 92.0 %", (300.0, False): "82.5 %, 81.0 %", (300.0, True): "71.5 %, 70.0 %",
+           (600.0, False): "63.5 %, 67.5 %", (600.0, True): "57.0 %, 59.5 %"}  # fmt: skip
+LASTING = [
+    pytest.param(*key, marks=pytest.mark.xfail(strict=True, reason=f"found {REACHED[key]}") if key in REACHED else ())
+    for key in ((length, grows) for length in (60.0, 150.0, 300.0, 600.0) for grows in (False, True))
+]
 MOTIONS = [(kind, motion) for kind in KINDS for motion in (False, True) if motion or kind != "scale"]
 
 
-def scored(kind, motion, seeds):
+def scored(cases, kind):
     """Shares of the cases found on the right gyro, and of the right kind; events on other gyros; onset errors, s."""
     found, named, others, onsets = 0, 0, 0, []
-    for seed in seeds:
-        case = with_fault(kind, seed, motion)
+    for case in cases:
         events = find_faults(array_of(case.rate))
         mine = [
             one
@@ -32,12 +39,12 @@ def scored(kind, motion, seeds):
             strongest = max(mine, key=lambda one: one.evidence)
             found, named = found + 1, named + (strongest.kind == kind)
             onsets.append(strongest.start / RATE_HZ - case.start)
-    return found / len(seeds), named / len(seeds), others, np.abs(onsets)
+    return found / len(cases), named / len(cases), others, np.abs(onsets)
 
 
 def check(kind, motion, seeds):
     # Truth: the simulated fault. Bounds: the figures asked for, 95 % of the cases and 10 s.
-    found, named, others, onsets = scored(kind, motion, seeds)
+    found, named, others, onsets = scored([with_fault(kind, seed, motion) for seed in seeds], kind)
     print(f"{kind}, {'motion' if motion else 'rest'}: found {found:.1%}, kind {named:.1%}, on others {others}, "
           f"onset median {np.median(onsets):.2f} s, 95 % {np.quantile(onsets, 0.95):.2f} s")  # fmt: skip
     assert found >= FOUND
@@ -56,6 +63,18 @@ def test_each_kind_is_found_on_the_right_gyro(kind, motion):
 @pytest.mark.parametrize(("kind", "motion"), MOTIONS)
 def test_two_hundred_cases_of_each_kind(kind, motion):
     check(kind, motion, range(200))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("motion", [False, True])
+@pytest.mark.parametrize(("length", "grows"), LASTING)
+def test_two_hundred_drifts_that_do_not_come_back(length, grows, motion):
+    # Truth: the simulated drift. Bound: the 95 % asked for.
+    found, named, others, onsets = scored([lasting_drift(seed, motion, length, grows) for seed in range(200)], "drift")
+    print(f"drift in {length:g} s, {'grows' if grows else 'stays'} to the end, {'motion' if motion else 'rest'}: found "
+          f"{found:.1%}, kind {named:.1%}, on others {others}, onset median {np.median(onsets):.1f} s")  # fmt: skip
+    assert others <= 10
+    assert found >= FOUND
 
 
 @pytest.mark.parametrize("motion", [False, True])

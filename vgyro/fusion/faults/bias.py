@@ -40,13 +40,15 @@ def suspect_bias(slow: Slow, gyro: int, block_s: float, threshold: float) -> Can
     covered = np.flatnonzero(slow.counts)
     if covered.size == 0:
         return None
+    least = LEAST_SIZE * float(np.sqrt(slow.usual_white))
     for length, before in _windows(len(slow.mean)):
         places, difference, white = contrasts(slow, length, before)
         inside = slow.counts[places] & slow.counts[places - 1]
         if not inside.any():
             continue
         score = np.where(inside, np.abs(difference), 0.0) / np.sqrt(white + slow.wander(0.5 * (length + before)))
-        score[np.abs(difference) < LEAST_SIZE * np.sqrt(slow.usual_white)] = 0.0
+        # Of a drift to the end, halves of it differ by half its size.
+        score[np.abs(difference) < 0.5 * least] = 0.0
         place = int(np.argmax(score))
         if score[place] >= threshold and (best is None or score[place] > best[0]):
             best = float(score[place]), int(places[place]), length
@@ -54,7 +56,8 @@ def suspect_bias(slow: Slow, gyro: int, block_s: float, threshold: float) -> Can
         return None
     evidence, place, length = best
     change = fit_change(slow, place, length)
-    return _fault(slow, gyro, change, evidence, max(1, round(LONGEST_STEP_S / block_s)))
+    fault = _fault(slow, gyro, change, evidence, max(1, round(LONGEST_STEP_S / block_s)))
+    return fault if abs(fault.size) >= least else None
 
 
 def _windows(blocks: int) -> list[tuple[int, int]]:
