@@ -247,11 +247,7 @@ def test_a_response_that_is_not_declared_is_measured(analysed, monkeypatch):
 
 def test_both_engines_fuse_alike(analysed):
     tables = [f"{name}/weights.parquet" for name in DEFINITIONS]
-    # The bank's response would be measured, by filterpy in minutes: tests/engine/native/test_adaptive.py compares it.
-    some = {"fusion": {"methods": [name for name in METHODS if name != "al_majed"]}}
-    native, reference = (
-        fuse_in(analysed, tables, analysis={**ANALYSIS, **some, "engine": name})[0] for name in ENGINES
-    )
+    native, reference = (fuse_in(analysed, tables, analysis={**ANALYSIS, "engine": name})[0] for name in ENGINES)
     assert set(native) == set(reference)
     for name, column in native.items():
         # Of the GARCH models of waegli_guerrier the two engines find the maximum to some 1e-6.

@@ -162,7 +162,10 @@ def describe(outcome: Outcome, opened: OpenArray) -> Row:
         source = (
             fused
             if known
-            else measured_response(method.fuse, opened.rates, replace(opened.parameters, definition=outcome.definition))
+            # Gain and delay are the method's, whoever computes: the fast engine measures them.
+            else measured_response(
+                method.fuse, opened.rates, replace(opened.parameters, definition=outcome.definition, engine="native")
+            )
         )
         figures, how = {name: getattr(source, name) for name in FIGURES}, "analytic" if known else "measured"
     operations = float(method.operations(len(opened.gyros)))
