@@ -63,7 +63,7 @@ def noise_level(found: Residuals, gyro: int, counts: np.ndarray, healthy: np.nda
     level[counts] -= np.log1p(leak * found.energy[counts, gyro] / usual_variance[counts])
     usual_level = _usual(level[healthy])
     level = np.where(counts, level - usual_level, 0.0)
-    others = (expected - found.sigma2[gyro]) / (usual_variance * np.exp(usual_level))
+    others = (expected - found.sigma2[gyro]) / (expected * np.exp(usual_level))
     share = float(np.clip(1.0 - np.median(others), LEAST_SHARE, 1.0))
     return NoiseLevel(level, counts, _spreads(level[healthy], len(level)), share)
 
