@@ -126,10 +126,11 @@ def _gyro_sentences(dataset: DatasetPart) -> list[Conclusion]:
         mine = [one for one in bad if one.axis == axis]
         if mine:
             listed = "; ".join(
-                f"{one.gyro} ({one.figure} {significant(one.factor, 2)}×, {one.recording})" for one in mine
+                f"{one.gyro} ({one.figure} {significant(one.factor, 2)} times the median, {one.recording})"
+                for one in mine
             )
             verb = "is" if len(mine) == 1 else "are"
-            text = f"Axis {axis}: {len(mine)} of {len(members)} gyros {verb} bad, × the median of the array: {listed}."
+            text = f"Axis {axis}: {len(mine)} of {len(members)} gyros {verb} bad: {listed}."
             found.append(Conclusion(text, "bad", f"{mine[0].recording}-{axis}"))
         elif set(members) <= tested and not faulty_gyros(dataset).intersection(members):
             found.append(Conclusion(f"Axis {axis}: all {len(members)} gyros are healthy.", "good", f"axis-{axis}"))

@@ -13,8 +13,8 @@ from vgyro.fusion.faults import find_faults, search_faults, sentence
 FOUND, ONSET_S = 0.95, 10.0
 DAY_S = 86400.0
 SAMPLE_S = 1.0 / RATE_HZ
-# Found of 200 (rest, motion), where 95 % are not reached. With the true flicker and random walk given, 59 of 60 and 60 of
-# 60 of those of 300 and 600 s that grow to the end were found: 20 minutes tell a gyro's own wander too roughly.
+# Found of 200 (rest, motion), where 95 % are not reached. With the true flicker and random walk given, 59 of 60 and 60
+# of 60 of those of 300 and 600 s that grow to the end were found: 20 minutes tell a gyro's own wander too roughly.
 REACHED = {(150.0, True): "92.5 %, 92.0 %", (300.0, False): "82.5 %, 81.0 %", (300.0, True): "71.5 %, 70.0 %",
            (600.0, False): "63.5 %, 67.5 %", (600.0, True): "57.0 %, 59.5 %"}  # fmt: skip
 LASTING = [
