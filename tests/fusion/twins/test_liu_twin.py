@@ -119,8 +119,8 @@ DEAR = pytest.mark.xfail(
 )
 WIDE = pytest.mark.xfail(
     strict=True,
-    reason="0.74 (0.48-1.13) of dcc_in_sample[demeaned], 8 seeds (0.77 at 10 deg/s): a bias drift is the least of a curve "
-    "that is known from few values at its end, and differs by threes between seeds",
+    reason="0.74 (0.48-1.13) of dcc_in_sample[demeaned], 8 seeds (0.77 at 10 deg/s): a bias drift is the least of a "
+    "curve that is known from few values at its end, and differs by threes between seeds",
 )
 
 
