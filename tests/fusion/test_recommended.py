@@ -78,6 +78,20 @@ def test_posterior_deviation_at_rest_follows_the_noise(make_array):
     assert 0.7 < second < 1.3
 
 
+def test_posterior_deviation_at_rest_counts_the_colour(make_array):
+    # Simulated truth: no rate, no bias; white noise through a pole of 40 Hz, whose long-run density is that of the
+    # white noise: the deviation of the smoothed rate is that without the pole.
+    keep = math.exp(-2 * math.pi * 40 / RATE_HZ)
+    values = []
+    for seed in range(8):
+        array = make_array(24_000, [0.1, 0.1, 0.1, 0.1], seed=seed)
+        for t in range(1, len(array.rate)):
+            array.rate[t] = keep * array.rate[t - 1] + (1 - keep) * array.rate[t]
+        fused = METHODS["recommended"].fuse(array, STILL)
+        values.append(np.mean((fused.rate / fused.sd.astype(float)) ** 2))
+    assert 0.7 < np.mean(values) < 1.3
+
+
 def test_the_motion_is_chosen_once(make_array):
     array = make_array(12_000, [0.1, 0.1, 0.2, 0.1], truth=motion(12_000), at_rest=False)
     chosen = shared_motion(array, MOVING)

@@ -194,7 +194,9 @@ def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) ->
     result = smooth(signal.rate, mean, array.segment, array.rate_hz, motion, 0.0, parameters.engine)
     share = np.broadcast_to(np.asarray(signal.variance) / mean, array.segment.shape)
     if math.isfinite(result.bandwidth_hz) and result.passes:
-        share = _around(array, share, result.bandwidth_hz, parameters.engine)
+        # Far below the sensor's pole coloured noise is white noise of its long-run variance.
+        colour = (1.0 + signal.colour) / (1.0 - signal.colour)
+        share = colour * _around(array, share, result.bandwidth_hz, parameters.engine)
     return result, result.variance * share
 
 
