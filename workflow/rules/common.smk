@@ -331,7 +331,7 @@ def artefacts_of(wildcards):
                     for part in parts
                 ]
     for source in noise_source(wildcards):
-        folder = source.removesuffix("/rates.parquet")
+        folder = source.rsplit("/", 1)[0]
         paths += [
             f"{folder}/{axis}/more_gyros.parquet"
             for axis in DATASETS[dataset].board.axes
