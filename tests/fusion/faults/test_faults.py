@@ -13,8 +13,8 @@ from vgyro.fusion.faults import find_faults, search_faults, sentence
 FOUND, ONSET_S = 0.95, 10.0
 DAY_S = 86400.0
 SAMPLE_S = 1.0 / RATE_HZ
-# Found of 200 (rest, motion), where 95 % are not reached. With the true flicker and random walk given, 59 of 60 and 60
-# of 60 of those of 300 and 600 s that grow to the end were found: 20 minutes tell a gyro's own wander too roughly.
+# Found of 200 (rest, motion), where 95 % are not reached. With the true flicker and random walk given, 59 of 60 (300 s)
+# and 60 of 60 (600 s) that grow to the end were found: 20 minutes tell a gyro's own wander too roughly.
 REACHED = {(150.0, True): "92.5 %, 92.0 %", (300.0, False): "82.5 %, 81.0 %", (300.0, True): "71.5 %, 70.0 %",
            (600.0, False): "63.5 %, 67.5 %", (600.0, True): "57.0 %, 59.5 %"}  # fmt: skip
 LASTING = [
@@ -164,6 +164,18 @@ def test_a_fault_of_most_of_the_recording_does_not_become_its_health():
     (event,) = find_faults(array_of(rate))
     assert (event.gyro, event.kind, event.stop) == (3, "drift", len(rate))
     assert event.start * SAMPLE_S == pytest.approx(1000, abs=150)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+def test_the_size_of_the_noise_does_not_depend_on_how_long_it_lasts(share):
+    # Truth: three times the noise in so much of the recording; beyond half of it, the median is of the fault.
+    array = healthy(16, 1800.0)
+    rate, late = array.rate(), array.time >= (1 - share) * 1800
+    white = array.sigma[3] * np.sqrt(RATE_HZ) * np.random.default_rng(8).standard_normal(late.sum())
+    rate[late, 3] += np.sqrt(8) * white
+    (event,) = find_faults(array_of(rate))
+    assert (event.gyro, event.kind) == (3, "noise")
+    assert event.size == pytest.approx(3, rel=0.15)
 
 
 def test_noise_of_the_whole_recording_is_no_event():
