@@ -18,6 +18,8 @@ TESTS = ("constant", "random", "sinusoid")
 BANDWIDTH = 1.053
 """Hz, of the filters with the paper's q and the twin's ARW: docs/methods.md"""
 ALIKE = 1.01
+LEAST = 1e-5
+"""deg/s"""
 POLE_S = 1 / (2 * math.pi * 40)
 """Delay of the sensor, s."""
 FILTERS = ("jiang_random_walk", "jiang_markov")
@@ -37,7 +39,8 @@ def dynamic(recording, seeds, names=None, twin=None, **parameters) -> Figures:
         one = case(twin, recording, seed, volatility=NO_DCC, **parameters)
         for column, fused in run(one, names).fused.items():
             for figure, value in table3.jiang_dynamic(one, fused).items():
-                found[column][figure].append(value)
+                # A constant may be left without any deviation at all, which has no ratio.
+                found[column][figure].append(max(value, LEAST) if figure == "sigma" else value)
     return found
 
 
