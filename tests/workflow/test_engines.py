@@ -1,9 +1,10 @@
 """The demo board on both engines: C kernels and libraries must tell the same story.
 
 Tolerances. Figures without a fitted window: 1e-9 of their size. Figures of DCC and CCC weights: a tenth of the width of
-their own 95 % interval, because two searches may end on different points of a flat likelihood. Likelihoods: a search
-that starts from a grid misses the best of several optima now and then. The bounds are those of the tests of the engine:
-worse by more than 1e-5 a sample in less than 0.5 % of the windows, by 1e-3 in none.
+their own 95 % interval, because two searches may end on different points of a flat likelihood; the τ of a lowest point
+may then be the next one. Smoothed by a model of five states: 1e-6 of size and interval, for rounding grows in it.
+Likelihoods: a search that starts from a grid misses the best of several optima now and then. The bounds are those of
+the tests of the engine: worse by more than 1e-5 a sample in less than 0.5 % of the windows, by 1e-3 in none.
 """
 
 import shutil
@@ -65,8 +66,12 @@ def test_every_figure_is_the_same_within_the_tolerance(runs):
     assert (both["value_native"].isna() == both["value_reference"].isna()).all()
     width = (both["high_reference"] - both["low_reference"]).fillna(0.0)
     fitted = both["method"].str.startswith(FITTED)
+    smoothed = both["method"] == "recommended"
     exact = 1e-9 * both["value_reference"].abs() + 1e-15
+    exact = exact + np.where(smoothed, 1e-6 * (both["value_reference"].abs() + width), 0.0)
+    next_tau = fitted & (both["metric"] == "bias_drift_tau")
     allowed = np.where(fitted, exact + 0.1 * width + 1e-3 * both["value_reference"].abs(), exact)
+    allowed = np.where(next_tau, 0.3 * both["value_reference"].abs(), allowed)
     wrong = both[difference > allowed]
     assert not len(wrong), wrong[
         [*KEY, "value_native", "value_reference", "low_reference", "high_reference"]
