@@ -17,7 +17,7 @@ from vgyro.report.plots import Axis, Curve, curve_plot
 from vgyro.report.tables import Cell, Column, number_cell, render_table
 
 # What a first look needs; the rest is one click away.
-SHOWN = ("average", "inverse_variance_arw", "jiang_random_walk", "dcc_causal")
+SHOWN = ("average", "inverse_variance_arw", "dcc_causal", "recommended_unsmoothed", "recommended")
 SPECTRUM_POINTS = 700
 OVERLAPPING = "overlapping"
 MOST_MARKED, FEW_TONES, MOST_LISTED = 12, 12, 60

@@ -47,7 +47,8 @@ def results(seeds, changes=None, volatility=NO_DCC, still=False, names=None, **p
         one = case(twin, "random", seed, volatility=volatility, **parameters)
         for column, fused in run(one, names).fused.items():
             found.add(column, error_sd(one, fused.rate))
-            if math.isnan(fused.bandwidth_hz):
+            # The bank says nothing of its bandwidth, which is narrow at rest.
+            if math.isnan(fused.bandwidth_hz) and math.isfinite(fused.dc_gain):
                 found.full.add(column)
             if fused.sd is not None:
                 found.nees.setdefault(column, []).append(float(np.mean(((fused.rate - one.truth) / fused.sd) ** 2)))
