@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from vgyro.fusion import METHODS, FilterParameters, SampleWeights
-from vgyro.fusion.analysed import analysed, shared_motion
+from vgyro.fusion.analysed import DCC, analysed, shared_motion
 from vgyro.fusion.events import FaultEvent
+from vgyro.fusion.parity import shared_variances
 from vgyro.fusion.recommended import static_weights
 from vgyro.fusion.smoothed import pole_time, without_pole
 
@@ -185,3 +187,29 @@ def test_static_weights_are_those_of_the_true_covariance(make_array):
     expected = np.maximum(solved, 0)
     np.testing.assert_allclose(static_weights(array, STILL), expected / expected.sum(), atol=0.06)
     assert analysed(array, STILL) is analysed(array, STILL)
+    other = analysed(array, replace(STILL, temperature="off"))
+    assert other is not analysed(array, STILL), "other parameters, another analysis"
+
+
+def test_constant_and_changing_variances_are_kept_apart(make_array):
+    array = make_array(6000, [0.1, 0.1, 0.1])
+    array.rate[3000:] *= 5.0
+    constant, changing = (shared_variances(array, STILL, one) for one in (False, True))
+    assert np.ptp(constant.variance[:, 0]) == 0
+    assert changing.variance[-1, 0] > 10 * changing.variance[0, 0]
+
+
+def test_where_dcc_is_preferred_its_variances_weigh(make_array, monkeypatch):
+    # Closed form: w ∝ 1/σ² of the deviations given, even where a changing covariance was seen in the rates themselves.
+    samples, seconds = 12_000, 60
+    block = np.repeat(np.arange(seconds, dtype=np.int32), 200)
+    table = np.tile([0.05, 0.1, 0.2], (seconds, 1))
+    array = make_array(samples, [0.1, 0.1, 0.1])
+    array = replace(array, deviations={DCC: SampleWeights.of(table, block)})
+    found = shared_variances(array, STILL, True)
+    seen = replace(found, moving=np.tile(np.eye(3), (len(found.start), 1, 1)))
+    monkeypatch.setattr("vgyro.fusion.analysed.shared_variances", lambda *_: seen)
+    monkeypatch.setattr("vgyro.fusion.analysed.prefer_dcc", lambda *_: SimpleNamespace(prefer=True, note="preferred"))
+    inverse = table[0] ** -2.0
+    weights = every(analysed(array, STILL).weights)
+    np.testing.assert_allclose(weights, np.tile(inverse / inverse.sum(), (samples, 1)), atol=0.03)

@@ -15,7 +15,7 @@ import numpy as np
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.motion_models import Motion
-from vgyro.fusion.parity import Variances, parity_variances
+from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.parity_dcc import prefer_dcc
 from vgyro.fusion.slow import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.slow_blocks import SlowBlocks
@@ -42,14 +42,9 @@ class Analysed:
         return self.variances.combined_variance()[self.variances.block_of_sample()]
 
 
-def shared_variances(array: ArrayRates, parameters: FilterParameters, changing: bool) -> Variances:
-    """vgyro.fusion.parity.parity_variances."""
-    return array.once(("variances", changing), lambda: parity_variances(array, parameters, changing))
-
-
 def analysed(array: ArrayRates, parameters: FilterParameters) -> Analysed:
     """R_t and b of a recording.  raises : CannotRun, as parity_variances"""
-    return array.once("analysed", lambda: _analysed(array, parameters))
+    return array.once(("analysed", parameters), lambda: _analysed(array, parameters))
 
 
 def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
@@ -63,7 +58,7 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
             parameters.motion_models, parameters.engine, moving,
         )  # fmt: skip
 
-    return array.once("motion", choose)
+    return array.once(("motion", parameters), choose)
 
 
 def _analysed(array: ArrayRates, parameters: FilterParameters) -> Analysed:
@@ -90,4 +85,4 @@ def _of_dcc(array: ArrayRates, parameters: FilterParameters, variances: Variance
     block = deviations.block[(variances.start + variances.stop) // 2]
     variance = length * table[np.maximum(block, 0)] ** 2
     known = (block >= 0)[:, None] & np.isfinite(variance) & (variance > 0)
-    return replace(variances, variance=np.where(known, variance, variances.variance))
+    return replace(variances, variance=np.where(known, variance, variances.variance), moving=None)

@@ -144,6 +144,11 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     )  # fmt: skip
 
 
+def shared_variances(array: ArrayRates, parameters: FilterParameters, changing: bool) -> Variances:
+    """parity_variances, made once for all methods that need them."""
+    return array.once(("variances", changing, parameters), lambda: parity_variances(array, parameters, changing))
+
+
 def _correlation(array: ArrayRates) -> np.ndarray:
     """That of the noise record, where it was measured; else none."""
     measured = array.noise.correlation

@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro.fusion.array import ArrayRates, FilterParameters, Fused
 from vgyro.fusion.blocks import combined
-from vgyro.fusion.parity import Variances, parity_variances
+from vgyro.fusion.parity import Variances, parity_variances, shared_variances
 
 
 def parity_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
@@ -28,7 +28,7 @@ def parity_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
 
 def residual_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """Minimum-variance weights of each block from variances that change with time; a gyro at fault has none."""
-    found = array.once(("variances", True), lambda: parity_variances(array, parameters))
+    found = shared_variances(array, parameters, True)
     weights = found.sample_weights(parameters.engine)
     return Fused.undelayed(weights.combine(array.rate)[0], weights, f"{found.note}; {described(found)}")
 

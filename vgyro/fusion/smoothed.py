@@ -14,12 +14,12 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.errors import DataError
-from vgyro.fusion.analysed import DCC, shared_motion, shared_variances
+from vgyro.fusion.analysed import DCC, shared_motion
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.conditional import conditional
 from vgyro.fusion.fixed import median
-from vgyro.fusion.parity import Variances
+from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, smooth
 
 SLOW_BESIDE_POLE = 0.5
