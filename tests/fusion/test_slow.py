@@ -84,7 +84,8 @@ def variances(array, blocks):
 def one_prior(evidence, _):
     """A prior of one part."""
     slopes = SLOPES if evidence.has_slopes else []
-    return Prior(np.ones(1), np.concatenate([BIASES, evidence.steps, slopes])[None])
+    variance = np.concatenate([BIASES, evidence.steps, slopes])
+    return Prior(np.ones(1), variance[None], np.eye(len(variance)))
 
 
 def dense(array, blocks, variance, prior, slopes, tau=np.inf):
@@ -161,7 +162,7 @@ def test_a_mixture_of_priors(recording):
     each = [posterior(filtered, one) for one in prior]
     mean = sum(part * one.mean for part, one in zip(share, each, strict=True))
     second = sum(part * (one.covariance + np.outer(one.mean, one.mean)) for part, one in zip(share, each, strict=True))
-    found = Prior(share, prior).posterior(filtered)
+    found = Prior(share, prior, np.eye(4)).posterior(filtered)
     np.testing.assert_allclose(found.mean, mean, atol=1e-12)
     np.testing.assert_allclose(found.covariance, second - np.outer(mean, mean), atol=1e-12)
 

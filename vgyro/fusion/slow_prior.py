@@ -3,13 +3,14 @@
 The biases of healthy gyros are normal variables about one centre, of one standard deviation s that is not known, with
 the prior density 1/s; a few gyros may be far off. What all share goes to the motion where nothing anchors it, so the
 common bias is as well known as the mean of the healthy ones: their spread says how well, not the noise of the means.
+Where standstill anchors it the centre is measured, and nothing is known of it beforehand: it may lie anywhere.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -28,30 +29,32 @@ OPEN = 1e4
 """Variance of the constants for a first look at them, of that with which each is measured: wide, but not so that
 rounding is taken for what all share."""
 WIDE = 100.0
-"""Variance of the biases while the slopes' is sought, of the largest square seen."""
+"""Variance of the biases while the slopes' is sought, and of a centre that is measured, of the largest square seen."""
 
 
 @dataclass(frozen=True)
 class Prior:
-    """A mixture of M priors of the constants, each of independent normal variables of mean 0.
+    """A mixture of M priors of the k constants: sums of p independent normal variables of mean 0.
 
-    share [M], Σ = 1, posterior;  variance [M, k]
+    share [M], Σ = 1, posterior;  variance [M, p], of the variables
+    sums [k, p] : the constants are sums @ variables: what is each one's own, then the centres that some share
     """
 
     share: np.ndarray
     variance: np.ndarray
+    sums: np.ndarray
 
     def spread(self, constants: slice) -> float:
         """Largest mean variance of some of the constants."""
-        return float((self.share @ self.variance)[constants].max())
+        return float((self.sums**2 @ (self.share @ self.variance))[constants].max())
 
     def posterior(self, filtered: Filtered) -> Constants:
         """Mean and covariance of the constants over the mixture."""
-        means, covariances, _ = _posteriors(filtered, self.variance)
+        means, covariances, _ = _posteriors(_of_variables(filtered, self.sums), self.variance)
         mean = self.share @ means
         apart = means - mean
         covariance = np.tensordot(self.share, covariances, axes=1) + (apart.T * self.share) @ apart
-        return Constants(mean, covariance)
+        return Constants(self.sums @ mean, self.sums @ covariance @ self.sums.T)
 
 
 def empirical_prior(evidence: Evidence, filtered: Filtered) -> Prior:
@@ -62,28 +65,31 @@ def empirical_prior(evidence: Evidence, filtered: Filtered) -> Prior:
     mean of N normal variables, times (N - 1)/(N - 3). Temperature slopes: one variance, its posterior mean likewise.
     Gelman et al. (2013), Bayesian Data Analysis, ch. 5 (hierarchical normal model).
     """
-    gyros = evidence.gyros
+    gyros, many = evidence.gyros, len(filtered.squares) - 1
     groups = [slice(0, gyros)]
-    if len(filtered.squares) > 1 + evidence.plain:
-        groups.append(slice(evidence.plain, None))
+    if many > evidence.plain:
+        groups.append(slice(evidence.plain, many))
     looks = [_Look.of(filtered, group) for group in groups]
     open_wide = [np.full(gyros, look.open_wide) for look in looks]
+    sums, centres = np.eye(many), np.zeros(0)
+    if evidence.anchored:
+        shared = [np.isin(np.arange(many), np.r_[group]) for group in groups]
+        sums, centres = np.column_stack([sums, *shared]), np.array([look.open_wide for look in looks])
     slopes: list[np.ndarray] = []
     if len(groups) > 1:
 
         def with_slopes(variance: np.ndarray) -> np.ndarray:
-            return np.concatenate([open_wide[0], evidence.steps, variance])
+            return np.concatenate([open_wide[0], evidence.steps, variance, centres])
 
         slope_sizes = [np.full(gyros, size) for size in looks[1].sizes()]
-        slopes = [
-            np.full(gyros, _weighed(filtered, slope_sizes, np.zeros(len(slope_sizes)), with_slopes).spread(groups[1]))
-        ]
+        found = _weighed(filtered, slope_sizes, np.zeros(len(slope_sizes)), with_slopes, sums)
+        slopes = [np.full(gyros, (found.share @ found.variance)[evidence.plain])]
 
     def with_biases(variance: np.ndarray) -> np.ndarray:
-        return np.concatenate([variance, evidence.steps, *slopes])
+        return np.concatenate([variance, evidence.steps, *slopes, centres])
 
     variances, logarithms = looks[0].with_far_off()
-    return _weighed(filtered, variances, logarithms, with_biases)
+    return _weighed(filtered, variances, logarithms, with_biases, sums)
 
 
 @dataclass(frozen=True)
@@ -147,15 +153,24 @@ def _weighed(
     variances: list[np.ndarray],
     logarithms: np.ndarray,
     complete: Callable[[np.ndarray], np.ndarray],
+    sums: np.ndarray,
 ) -> Prior:
     """The mixture of priors whose shares are the posterior ones.
 
-    logarithms [M] : of the shares beforehand;  complete : variances of one kind → those of all constants [k]
+    logarithms [M] : of the shares beforehand;  complete : variances of one kind → those of all variables [p]
+    sums : as of Prior
     """
     every = np.stack([complete(one) for one in variances])
-    found = logarithms + _posteriors(filtered, every)[2]
+    found = logarithms + _posteriors(_of_variables(filtered, sums), every)[2]
     share = np.exp(found - found.max())
-    return Prior(share / share.sum(), every)
+    return Prior(share / share.sum(), every, sums)
+
+
+def _of_variables(filtered: Filtered, sums: np.ndarray) -> Filtered:
+    """What the innovations say of p variables of which the constants are sums [k, p]."""
+    turn = np.zeros((len(sums) + 1, sums.shape[1] + 1))
+    turn[0, 0], turn[1:, 1:] = 1.0, sums
+    return replace(filtered, squares=turn.T @ filtered.squares @ turn)
 
 
 def _posteriors(filtered: Filtered, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
