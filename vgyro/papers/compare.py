@@ -9,15 +9,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from vgyro.papers.beside import Compared
 from vgyro.papers.evidence import Evidence, Ours, look_up
 from vgyro.papers.implied import Implied
 from vgyro.papers.published import Heading, Paper, PublishedTable, Variant, half_unit
 
 Agreement = Literal["within interval", "within 10 %", "differs", "none"]
 NEAR = 0.10
+OWN, OF_PAPER = "vgyro, not in the paper", "method of the paper"
 CSV_COLUMNS = (
     "paper", "table", "row", "column", "unit", "published", "implied", "implied_how", "variant", "ours", "low", "high",
-    "ours_is", "agreement", "source", "reason",
+    "ours_is", "agreement", "source", "reason", "over", "ratio", "ratio_low", "ratio_high", "standing",
 )  # fmt: skip
 
 
@@ -112,14 +114,19 @@ def agreement(published: str | None, ours: Ours) -> Agreement:
     return "within 10 %" if abs(ours.value - value) <= NEAR * abs(value) else "differs"
 
 
-def csv_of(comparisons: Sequence[Comparison]) -> str:
-    """The cells as CSV, one line a reading; an empty field where there is no number."""
+def csv_of(comparisons: Sequence[Comparison], beside: Sequence[Compared] = ()) -> str:
+    """The cells as CSV, one line a reading; an empty field where there is no number.
+
+    beside : methods of ours beside the paper's, of the last table, which go behind the cells
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(CSV_COLUMNS)
     for comparison in comparisons:
         for cell in comparison.cells:
             writer.writerow(_line(comparison.paper, cell))
+    for one in beside:
+        writer.writerow(_beside_line(comparisons[-1], one))
     return text.getvalue()
 
 
@@ -129,7 +136,18 @@ def _line(paper: str, cell: Cell) -> list[Any]:
         paper, cell.table, cell.row, cell.column, cell.unit, cell.published or "",
         _digits(follows.value), follows.how, cell.variant,
         _digits(cell.ours.value), _digits(cell.ours.low), _digits(cell.ours.high),
-        "simulated" if cell.ours.known else "", cell.agreement, cell.ours.source, cell.reason,
+        "simulated" if cell.ours.known else "", cell.agreement, cell.ours.source, cell.reason, "", "", "", "", "",
+    ]  # fmt: skip
+
+
+def _beside_line(comparison: Comparison, one: Compared) -> list[Any]:
+    variant = "; ".join(filter(None, (OWN if one.own else OF_PAPER, one.case)))
+    return [
+        comparison.paper, comparison.table.number, one.method, one.figure, one.unit, "", "", "", variant,
+        _digits(one.value.value), _digits(one.value.low), _digits(one.value.high),
+        "simulated" if one.value.known else "", "none", one.value.source, one.value.reason,
+        one.over, _digits(one.ratio.value), _digits(one.ratio.low), _digits(one.ratio.high),
+        "" if one.standing == "none" else one.standing,
     ]  # fmt: skip
 
 

@@ -37,6 +37,42 @@ class Variant(StrictModel):
     select: Selection = Field({})
 
 
+class Case(StrictModel):
+    """A true rate at which methods are compared.
+
+    name : "{rate}" in it stands for the rate that was added, deg/s;  suffix : behind the name of every artefact
+    """
+
+    name: str
+    suffix: str = ""
+
+
+class OwnFigure(Heading):
+    """A figure by which methods of ours stand beside the paper's: the smaller the better, or near a target.
+
+    paired         : artefact that holds ratios of the same samples; null: the quotient of two figures, taken as
+                     independent, so that its interval is too wide
+    target, within : what the figure should be, and how near; null: as small as can be
+    """
+
+    paired: str | None = None
+    target: float | None = None
+    within: float = 0.0
+
+
+class Beside(StrictModel):
+    """Methods of vgyro's own beside the paper's, on the same simulated board.
+
+    rivals : names of the table's rows or columns, extra ones included, that ours are compared with
+    """
+
+    methods: tuple[Heading, ...] = Field(min_length=1)
+    rivals: tuple[str, ...] = Field(min_length=1)
+    figures: tuple[OwnFigure, ...] = Field(min_length=1)
+    cases: tuple[Case, ...] = (Case(name=""),)
+    note: str = ""
+
+
 class PublishedTable(StrictModel):
     """number : 1-3, or "text" for figures that stand in the running text; values : as printed, null where no cell is"""
 
@@ -52,6 +88,7 @@ class PublishedTable(StrictModel):
     variants: tuple[Variant, ...] = Field(min_length=1)
     extra_rows: tuple[Heading, ...] = Field((), description="rows of ours that the paper does not have")
     extra_columns: tuple[Heading, ...] = Field((), description="columns of ours that the paper does not have")
+    beside: Beside | None = Field(None, description="methods of ours beside the paper's")
 
     @model_validator(mode="after")
     def _shape(self) -> PublishedTable:
@@ -64,7 +101,17 @@ class PublishedTable(StrictModel):
             for column in self.columns:
                 if row.unit is None and column.unit is None and self.unit is None:
                     raise ValueError(f"table {self.number}: {row.name} / {column.name} has no unit")
+        self.rivals()
         return self
+
+    def rivals(self) -> tuple[Heading, ...]:
+        """The headings that methods of ours are compared with.  raises : ValueError for a name that is not there"""
+        names = self.beside.rivals if self.beside else ()
+        known = {one.name: one for one in (*self.rows, *self.columns, *self.extra_rows, *self.extra_columns)}
+        unknown = [name for name in names if name not in known]
+        if unknown:
+            raise ValueError(f"table {self.number} has no {unknown[0]!r} to compare with")
+        return tuple(known[name] for name in names)
 
     def unit_of(self, row: Heading, column: Heading) -> str:
         """Unit of a cell: the row's, else the column's, else the table's."""

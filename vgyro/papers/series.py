@@ -102,6 +102,7 @@ def paired_ratios(
                 value = float(figures[metric][index] / figures[metric][to])
                 low, high = (float(limit) for limit in value * np.quantile(drawn_ratio, tails) / np.median(drawn_ratio))
                 about = {"method": method, "definition": definition, "over": label, "metric": metric}
+                about |= {"over_method": name[0], "over_definition": name[1]}
                 rows.append({**place, **about, "value": value, "low": low, "high": high, "unit": "1", "note": ""})
     return rows
 

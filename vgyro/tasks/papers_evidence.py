@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 
 from vgyro.board import Board
 from vgyro.config import MetricsOptions, VolatilityOptions
 from vgyro.dataset import ConstantReference, Manifest
 from vgyro.papers import Evidence, with_single
-from vgyro.papers.series import extremes, paired_ratios, series_figures
-from vgyro.storage.tables import read_columns
+from vgyro.papers.beside import CASE_RATE
+from vgyro.papers.series import Name, extremes, paired_ratios, series_figures
+from vgyro.storage.tables import read_columns, read_metadata
 from vgyro.tasks.measure import fused_series
 from vgyro.tasks.rates_file import read_array
 from vgyro.volatility import Series, block_means
@@ -22,6 +24,8 @@ from vgyro.volatility import Series, block_means
 Rows = list[dict[str, Any]]
 # 95 % limits of an estimate with this standard error.
 TWO_SIDED = 1.959964
+# Behind the names of artefacts: with a constant rate added (analysis.metrics.injected_rate).
+MOVED = "_moved"
 # Liu et al. (2015), section 5: the fourth gyro is faulty from 1000 s on, and its weight is near zero after 2500 s.
 FAULTY, STRETCHES = 4, {"before 1000 s": (0.0, 1000.0), "after 2500 s": (2500.0, math.inf)}
 
@@ -42,11 +46,13 @@ def gather(
     volatility: VolatilityOptions,
     metrics: MetricsOptions,
     slow_series: bool,
+    rivals: Sequence[Name] = (),
 ) -> Evidence:
     """Evidence of one twin from all its artefacts.
 
     paths : files under …/<recording>/[<axis>/[<definition>/]]<table>.parquet; tables that no cell needs are passed over
     slow_series : whether the figures of the block means are wanted (L, Table 3)
+    rivals : methods of the paper's that ours are compared with
     """
     gyros = [gyro.name for gyro in board.array(board.axes[0])]
     rows: dict[str, Rows] = {}
@@ -55,18 +61,49 @@ def gather(
         if read is not None:
             rows.setdefault(path.stem, []).extend(read(path, gyros))
     if "metrics" in rows:
-        rows["metrics"] = with_single(with_table_means(rows["metrics"], manifest), gyros)
+        still = [row for row in rows["metrics"] if row[CASE_RATE] == 0]
+        rows[f"metrics{MOVED}"] = at_added_rate(rows["metrics"], manifest)
+        rows["metrics"] = with_single(with_table_means(still, manifest), gyros)
     for static in at_rest(paths, manifest) if slow_series else ():
-        place = {"recording": static.parts[-3], "axis": static.parts[-2]}
-        names, values, stretch, rate_hz = _block_series(static, gyros, volatility)
+        for suffix, found in _slow_rows(static, gyros, volatility, metrics, rivals):
+            for name, part in found.items():
+                rows.setdefault(f"{name}{suffix}", []).extend(part)
+    return Evidence(rows, gyros)
+
+
+def at_added_rate(rows: Rows, manifest: Manifest) -> Rows:
+    """Figures at rest with a constant rate added; a method that such a rate does not change keeps its figures.
+
+    rows : of metrics.parquet;  returns : [] if no rate was added
+    """
+    static = {recording.name for recording in manifest.recordings if recording.kind == "static"}
+    rows = [row for row in rows if row["recording"] in static]
+    moved = [row for row in rows if row[CASE_RATE] != 0]
+    touched = {_series(row) for row in moved}
+    return moved + [row for row in rows if moved and row[CASE_RATE] == 0 and _series(row) not in touched]
+
+
+def _series(row: dict[str, Any]) -> tuple[str, str, str, str]:
+    return row["recording"], row["axis"], row["method"], row["definition"]
+
+
+def _slow_rows(
+    fused: Path, gyros: list[str], volatility: VolatilityOptions, metrics: MetricsOptions, rivals: Sequence[Name]
+) -> Iterator[tuple[str, dict[str, Rows]]]:
+    """(suffix of the artefact, rows by artefact): figures of the block means at rest, and at an added constant rate."""
+    place = {"recording": fused.parts[-3], "axis": fused.parts[-2]}
+    for suffix, path in (("", None), (MOVED, fused.with_name("moved.parquet"))):
+        rate = 0.0 if path is None else added_rate(path)
+        if rate is None:
+            continue
+        names, values, stretch, rate_hz = _block_series(fused, gyros, volatility, path)
         figures = series_figures(place, names, len(gyros), values, stretch, rate_hz, metrics)
         over = {**AGAINST, **extremes(figures.metrics, gyros, gyros[FAULTY - 1])}
+        over |= {f"{one[0]}[{one[1]}]": one for one in rivals if one not in AGAINST.values()}
         there = {label: name for label, name in over.items() if name in names}
-        rows.setdefault("metrics_1hz", []).extend(figures.metrics)
-        rows.setdefault("factors_1hz", []).extend(figures.factors)
         ratios = paired_ratios(place, names, values, stretch, rate_hz, there, metrics)
-        rows.setdefault("ratios_1hz", []).extend(ratios)
-    return Evidence(rows, gyros)
+        found = {"metrics_1hz": figures.metrics, "factors_1hz": figures.factors, "ratios_1hz": ratios}
+        yield suffix, {name: [{**row, CASE_RATE: rate} for row in part] for name, part in found.items()}
 
 
 def _records(path: Path, **place: str) -> Rows:
@@ -75,8 +112,7 @@ def _records(path: Path, **place: str) -> Rows:
 
 
 def _metrics(path: Path, _gyros: Sequence[str]) -> Rows:
-    """The figures of the recording as it is; those at another rate are not the papers'."""
-    return [row for row in _records(path) if row["true_rate"] == 0]
+    return _records(path)
 
 
 def _correlation(path: Path, _gyros: Sequence[str]) -> Rows:
@@ -151,22 +187,36 @@ def at_rest(paths: Sequence[Path], manifest: Manifest) -> list[Path]:
     return [path for path in paths if path.stem == "fused" and path.parts[-3] in static]
 
 
+def added_rate(moved: Path) -> float | None:
+    """The rate that was added, deg/s; None: there is no such file, or it holds no method.  moved : moved.parquet"""
+    if not moved.exists() or not set(pq.read_schema(moved).names) - {"time", "segment"}:
+        return None
+    rate = read_metadata(moved).get("injected_rate")
+    return None if rate is None else float(rate)
+
+
 def _block_series(
-    fused: Path, gyros: list[str], volatility: VolatilityOptions
-) -> tuple[list[tuple[str, str]], np.ndarray, np.ndarray, float]:
+    fused: Path, gyros: list[str], volatility: VolatilityOptions, moved: Path | None = None
+) -> tuple[list[Name], np.ndarray, np.ndarray, float]:
     """(method, definition) of each column, block means [M, S], stretch [M], rate: single gyros first, then methods.
 
     fused : …/<recording>/<axis>/fused.parquet, with methods.parquet beside it and rates.parquet one folder up
+    moved : moved.parquet: the errors at an added rate, where a method has some there
     """
     array = read_array(fused.parents[1] / "rates.parquet", gyros, fused.parts[-2])
     methods = fused_series(fused, read_columns(fused.with_name("methods.parquet")))
     block_hz = array.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
+    at_a_rate = set(pq.read_schema(moved).names) if moved else set()
 
     def means(columns: np.ndarray) -> Series:
         return block_means(columns, array.rate_hz, block_hz, array.segment, array.at_rest, array.time)
 
+    def values_of(column: str) -> np.ndarray:
+        path = moved if moved and column in at_a_rate else fused
+        return means(read_columns(path, [column])[column][:, None]).values
+
     # One column at a time: the record of all methods at the full rate is large.
     singles = means(array.rate)
-    virtual = [means(read_columns(fused, [one.column])[one.column][:, None]).values for one in methods]
+    virtual = [values_of(one.column) for one in methods]
     names = [(gyro, "") for gyro in gyros] + [(one.method, one.definition) for one in methods]
     return names, np.hstack([singles.values, *virtual]), singles.stretch, singles.rate_hz

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from markupsafe import Markup
 
 from vgyro.dataset import Manifest
 from vgyro.papers import Claim, Comparison, Paper, Verdict
+from vgyro.papers.beside import Compared
 from vgyro.papers.compare import Agreement, Cell
 from vgyro.papers.published import Heading
 from vgyro.report import html, numbers, tables
 from vgyro.report.page import Section, render_page
+from vgyro.tasks.papers_own import own_counts, own_methods
 
 TONES: dict[Agreement, tables.Tone] = {"within interval": "good", "within 10 %": "warn", "differs": "bad", "none": ""}
 VERDICT_TONES = {"holds": "good", "does not hold": "bad", "cannot be decided": "warn"}
 COUNTED: dict[Agreement, str] = {
     "within interval": "within our interval",
-    "within 10 %": "within 10 %",
+    "within 10 %": "within 10\N{NO-BREAK SPACE}%",
     "differs": "differ",
     "none": "without a figure of ours",
 }
 OUTCOMES = {"holds": "hold", "does not hold": "do not hold", "cannot be decided": "cannot be decided"}
 LEGEND = (
-    "Ours is simulated; its limits are 95 %, where a method gives them. Its colour compares it with the published "
-    "figure: green, that lies within our limits (or rounding); amber, within 10 %; red, it differs. A difference is a "
-    "finding. Implied: what the equations give from the paper's own numbers, without any simulation."
+    "Simulated: the same method on the twin; the limits are 95 %, where a method gives them. The colour compares it "
+    "with the published figure: green, that lies within our limits (or rounding); amber, within 10 %; red, it differs. "
+    "A difference is a finding. Implied: what the equations give from the paper's own numbers, without any simulation."
 )
+EXTRA = "not in the paper"
 
 
 def paper_page(
@@ -35,11 +38,18 @@ def paper_page(
     comparisons: Sequence[Comparison],
     verdicts: Sequence[tuple[Claim, Verdict]],
     plots: Markup,
+    beside: Mapping[int | str, Sequence[Compared]],
 ) -> str:
-    """A whole page as text; the same inputs give the same bytes.  plots : vgyro.tasks.papers_plots.figures"""
+    """A whole page as text; the same inputs give the same bytes.
+
+    plots : vgyro.tasks.papers_plots.figures;  beside : number of a table → methods of ours beside the paper's
+    """
     sections = [
-        Section("what", "What this is", _what(paper, comparisons, verdicts)),
-        *(Section(f"table-{part.table.number}", _title(part), _table(part)) for part in comparisons),
+        Section("what", "What this is", _what(paper, comparisons, verdicts, beside)),
+        *(
+            Section(f"table-{part.table.number}", _title(part), html.join(_table(part), _beside(part, beside)))
+            for part in comparisons
+        ),
         Section("claims", "Claims", _claims(verdicts)),
         *([Section("figures", "Figures", plots)] if plots else []),
         Section("twin", "How the twin was built", _twin(paper, manifest)),
@@ -56,7 +66,16 @@ def _title(comparison: Comparison) -> str:
     return table.title if table.number == "text" else f"Table {table.number}: {table.title}"
 
 
-def _what(paper: Paper, comparisons: Sequence[Comparison], verdicts: Sequence[tuple[Claim, Verdict]]) -> Markup:
+def _beside(part: Comparison, beside: Mapping[int | str, Sequence[Compared]]) -> Markup:
+    return own_methods(part.table, beside.get(part.table.number, ()))
+
+
+def _what(
+    paper: Paper,
+    comparisons: Sequence[Comparison],
+    verdicts: Sequence[tuple[Claim, Verdict]],
+    beside: Mapping[int | str, Sequence[Compared]],
+) -> Markup:
     firsts = [
         readings[0]
         for part in comparisons
@@ -74,6 +93,7 @@ def _what(paper: Paper, comparisons: Sequence[Comparison], verdicts: Sequence[tu
         html.definitions((
             (f"{len(firsts)} published numbers", ", ".join(f"{count} {name}" for name, count in counted)),
             (f"{len(verdicts)} claims", ", ".join(f"{count} {name}" for name, count in outcomes)),
+            *own_counts(beside),
         )),
         html.paragraph(LEGEND, "note"),
         tables.render_table(
@@ -90,11 +110,14 @@ def _table(comparison: Comparison) -> Markup:
     columns = (*table.columns, *table.extra_columns)
     rows: list[tables.Row] = []
     for row in (*table.rows, *table.extra_rows):
-        rows.append(tables.Row(heading=f"{row.name}{_unit(row.unit)}"))
+        rows.append(
+            tables.Row(heading=f"{row.name}{_unit(row.unit)}{f' ({EXTRA})' if row in table.extra_rows else ''}")
+        )
         rows += _lines(comparison, row, columns, notes)
     heads = (
         tables.Column("", numeric=False),
-        *(tables.Column(column.name, _unit(column.unit or table.unit).removeprefix(", ")) for column in columns),
+        *(tables.Column(column.name, _unit(column.unit or table.unit).removeprefix(", ")) for column in table.columns),
+        *(tables.Column(column.name, EXTRA) for column in table.extra_columns),
     )
     parts = [tables.render_table(heads, rows, f"{table.where} of the paper", notes.texts, compact=True)]
     return html.join(*parts, html.paragraph(table.note, "note") if table.note else "")
@@ -108,7 +131,7 @@ def _lines(comparison: Comparison, row: Heading, columns: Sequence[Heading], not
         lines.append(tables.Row((tables.Cell("published"), *printed)))
     for variant in dict.fromkeys(cell.variant for cells in readings for cell in cells):
         ours = [_ours(cells, variant, notes) for cells in readings]
-        lines.append(tables.Row((tables.Cell("ours", variant), *ours)))
+        lines.append(tables.Row((tables.Cell("simulated", variant), *ours)))
     if any(cells and cells[0].implied and cells[0].implied.value is not None for cells in readings):
         lines.append(tables.Row((tables.Cell("implied"), *(_implied(cells, notes) for cells in readings))))
     return lines
