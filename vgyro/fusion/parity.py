@@ -8,18 +8,20 @@ this recording or another one of the array; none where there is no such record.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters
 from vgyro.fusion.blocks import PIECE, SampleWeights
 from vgyro.fusion.parity_blocks import BlockMoments, block_moments
-from vgyro.fusion.parity_changing import Changing, changing_variances
+from vgyro.fusion.parity_changing import changing_variances
 from vgyro.fusion.parity_colour import colour
 from vgyro.fusion.parity_hat import constant_variances, patterns
 from vgyro.fusion.parity_hat import cornered_hat as cornered_hat
 from vgyro.fusion.parity_hat import pair_variances as pair_variances
+from vgyro.fusion.parity_memory import CONSTANT
+from vgyro.fusion.parity_moving import moving_noise
 from vgyro.fusion.parity_rest import Resting, resting_noise
 from vgyro.fusion.weights import min_variance_weights
 
@@ -108,7 +110,8 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     At rest as a whole those that change are of the rates themselves, and their correlation may change as well.
     changing : False gives constant variances. Otherwise each is a two-sided EWMA over blocks, or constant between
                change points, or both; time constant and change points are those that predict each block best from the
-               others, gyro by gyro, and must pay for themselves, so that white noise keeps a constant variance
+               others, gyro by gyro, and must pay for themselves, so that white noise keeps a constant variance. Where
+               the differences are predicted better if the correlation changes as well, it does (parity_moving)
     returns  : Variances; faults of the array and stuck gyros are left out
     raises   : CannotRun for one gyro, or fewer than 16 blocks (of 0.25 s; of a sample below 8 Hz) without fault
     Two gyros cannot be told apart by parity: each has half the variance of their difference.
@@ -123,25 +126,34 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     correlation = _correlation(array)
     constant, outlier = constant_variances(moments, correlation)
     variance = np.broadcast_to(constant, moments.excluded.shape)
-    tau, changes = np.full(gyros, math.inf), np.zeros(gyros, dtype=np.int64)
+    memories = [CONSTANT] * gyros
     moving = None
     if changing:
-        block_s = float(np.median(moments.size)) / array.rate_hz
-        found: Changing | Resting
-        if array.at_rest.all():
-            found = resting_noise(
-                block_moments(array, own=True), constant, correlation, block_s, parameters.engine
-            )  # fmt: skip
-            correlation, moving = found.correlation, found.moving
-        else:
-            found = changing_variances(moments, constant, outlier, correlation, block_s, parameters.engine)
-        variance, tau = found.variance, np.array([memory.tau_s for memory in found.memories])
-        changes = np.array([len(memory.points) for memory in found.memories])
+        found = _changing(array, moments, constant, outlier, correlation, parameters.engine)
+        variance, memories, correlation, moving = found.variance, found.memories, found.correlation, found.moving
+    tau = np.array([memory.tau_s for memory in memories])
+    changes = np.array([len(memory.points) for memory in memories])
     phi = colour(array, moments, constant)
     note = _note(moments, correlation, gyros, changing and bool(array.at_rest.all()), moving)
     return Variances(
         moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note, moving
     )  # fmt: skip
+
+
+def _changing(
+    array: ArrayRates, moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray,
+    engine: str,
+) -> Resting:  # fmt: skip
+    """Variances that change, and the correlation, if that changes as well."""
+    block_s = float(np.median(moments.size)) / array.rate_hz
+    if array.at_rest.all():
+        return resting_noise(block_moments(array, own=True), constant, correlation, block_s, engine)
+    found = changing_variances(moments, constant, outlier, correlation, block_s, engine)
+    both = moving_noise(moments, constant, correlation, block_s, found, engine)
+    if both is None:
+        return Resting(found.variance, found.memories, correlation, None)
+    memory = replace(CONSTANT, keep=math.exp(-block_s / both.tau_s), tau_s=both.tau_s)
+    return Resting(both.variance, [memory] * len(constant), correlation, both.correlation)
 
 
 def shared_variances(array: ArrayRates, parameters: FilterParameters, changing: bool) -> Variances:
@@ -162,13 +174,13 @@ def _note(
 ) -> str:  # fmt: skip
     if resting:
         notes = ["at rest as a whole: noise of the rates themselves"]
-        notes += ["their correlation changes"] if moving is not None else []
     else:
         notes = ["noise common to all gyros is in no difference between them"]
         if np.array_equal(correlation, np.eye(gyros)):
             notes[0] += ", and their correlation is taken as none"
         if gyros == 2:
             notes.append("two gyros cannot be told apart: equal shares")
+    notes += ["their correlation changes"] if moving is not None else []
     size = moments.size
     none = float(size[moments.excluded.all(axis=1)].sum() / size.sum())
     if none > 0:

@@ -22,14 +22,18 @@ class Changing:
     """Variances that change.
 
     variance [M, N] : (deg/s)² a sample;  memories [N] : what each is an average over
+    alone [M, N]    : the same from the other blocks alone
     square [M, N]   : the blocks' own mean squares, whose expectation it is
     freedom [M, N]  : the samples of these; 0: left out
+    outlier [M, N]  : blocks far above all others about them
     """
 
     variance: np.ndarray
+    alone: np.ndarray
     memories: list[Memory]
     square: np.ndarray
     freedom: np.ndarray
+    outlier: np.ndarray
 
 
 def changing_variances(
@@ -59,7 +63,7 @@ def changing_variances(
         least = np.maximum(LEAST_SHARE * float(np.median(constant)), np.where(outlier, square, 0.0))
         variance, alone = (np.where(known.any(axis=0), one, constant) for one in (variance, alone))
         variance, alone = np.maximum(variance, least), np.maximum(alone, least)
-    return Changing(variance, memories, square, freedom)
+    return Changing(variance, alone, memories, square, freedom, outlier)
 
 
 def _settled(

@@ -51,6 +51,9 @@ class Memory:
         return _ratio(around, near, level), _ratio(around - total, near - freedom, level)
 
 
+CONSTANT = Memory(np.empty(0, dtype=np.int64), 1.0, math.inf)
+
+
 def both_sides(values: np.ndarray, keep: float, low_pass: LowPass) -> np.ndarray:
     """Σ_c keep^|b - c|·values_c [M] of values [M]."""
     ahead = low_pass(np.ascontiguousarray(values[::-1]), keep, 1.0, 0.0)[::-1]
