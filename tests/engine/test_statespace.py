@@ -16,11 +16,11 @@ ENGINES = ("native", "reference")
 
 
 def model_of(states, pole=0.0, regimes=1, seed=3):
-    """A stable state space with full matrices; the second regime has another transition and ten times the process."""
+    """A stable state space with full matrices; each regime has its own transition, and ten times the process."""
     rng = np.random.default_rng(seed)
     F = np.stack([0.97 * np.linalg.qr(rng.standard_normal((states, states)))[0] for _ in range(regimes)])
     root = 0.3 * rng.standard_normal((regimes, states, states))
-    Q = root @ root.transpose(0, 2, 1) * np.array([1.0, 10.0])[:regimes, None, None]
+    Q = root @ root.transpose(0, 2, 1) * 10.0 ** np.arange(regimes)[:, None, None]
     reads, wanted, start = rng.standard_normal((3, states))
     return StateSpace(F, Q, reads, wanted, start, np.eye(states) * 4.0, pole)
 
@@ -32,7 +32,7 @@ def measured(samples=60, seed=1):
     r[[0, 7, 8, 30]] = np.inf
     z[[7, 30]] = np.nan
     regime = np.zeros(samples, dtype=np.uint8)
-    regime[20:33] = 1
+    regime[20:33], regime[45:52] = 1, 2
     return z, r, regime
 
 
@@ -67,7 +67,7 @@ def test_against_the_joint_posterior(which, states, pole):
     # Expected: the Gaussian posterior given all samples, from the dense covariance of the whole path.
     if states == 5 and pole:
         pytest.skip("coloured noise takes one of the five states")
-    module, model = engine.get(which).statespace, model_of(states, pole, regimes=2)
+    module, model = engine.get(which).statespace, model_of(states, pole, regimes=3)
     z, r, regime = measured()
     likelihood, mean, variance = dense(z, r, model, regime)
     found = module.smooth(z, r, model, regime)
@@ -155,7 +155,7 @@ def test_what_cannot_be_used_is_named(which):
         module.log_likelihood(lost, r, model)
     with pytest.raises(DataError, match="do not fit"):
         module.smooth(z, r[:7], model)
-    with pytest.raises(DataError, match="second regime"):
+    with pytest.raises(DataError, match="regime 2 is asked for, and the model has 1"):
         module.smooth(z, r, model, regime)
     with pytest.raises(DataError, match="6 states are too many"):
         module.smooth(z, r, model_of(5, 0.5))

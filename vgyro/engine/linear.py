@@ -17,7 +17,7 @@ MOST_STATES = 5
 class StateSpace:
     """x_t = F x_{t-1} + w_t, z_t = h'x_t + v_t; the combination c'x_t is wanted.
 
-    transition, process : F and the covariance of w, [n, n], or one of each for two regimes, [2, n, n]
+    transition, process : F and the covariance of w, [n, n], or one of each for every regime, [M, n, n]
     reads, wanted       : h and c, [n]
     start, spread       : mean [n] and covariance [n, n] of the state at the first sample, before it is measured
     pole                : φ of the noise, v_t = √r_t·a_t with a_t = φ·a_{t-1} + √(1 - φ²)·(white of variance 1): the
@@ -81,8 +81,9 @@ def checked(
     whole = model.whole()
     if len(whole.reads) > MOST_STATES:
         raise DataError(f"{len(whole.reads)} states are too many", remedy=f"the state space has at most {MOST_STATES}")
-    if flags.any() and len(whole.transition) < 2:
-        raise DataError("a second regime is asked for, and the model has one", remedy="give [2, n, n]")
+    most = min(len(whole.transition), len(whole.process))
+    if flags.any() and flags.max() >= most:
+        raise DataError(f"regime {flags.max()} is asked for, and the model has {most}", remedy="give [M, n, n] of both")
     usable = r > 0.0
     if not usable.all():
         raise EngineError("the variance r is not above zero", f"sample {int(np.argmin(usable))}", "infinite: no data")

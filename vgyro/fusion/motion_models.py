@@ -75,6 +75,30 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Activity:
+    """How lively the rate is, beside its model.
+
+    level : [T] of uint8;  factor : [M], what the model's process noise is multiplied by at each level
+    """
+
+    level: np.ndarray
+    factor: np.ndarray
+
+    @classmethod
+    def even(cls, samples: int, factor: float = 1.0) -> Activity:
+        """The same throughout."""
+        return cls(np.zeros(samples, dtype=np.uint8), np.array([factor]))
+
+    @property
+    def text(self) -> str:
+        other = float(np.mean(self.factor[self.level] != 1.0))
+        used = self.factor[np.unique(self.level)]
+        if not other:
+            return ""
+        return f"process noise × {used.min():.2g} to {used.max():.2g} in {100.0 * other:.0f} % of the time"
+
+
+@dataclass(frozen=True)
 class Dynamics:
     """Of n states: transition F and process Q [n, n], reads h [n] (the rate is h'x).
 

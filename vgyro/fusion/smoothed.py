@@ -14,11 +14,13 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.errors import DataError
-from vgyro.fusion.analysed import DCC, shared_motion
+from vgyro.fusion.activity import find_activity
+from vgyro.fusion.analysed import DCC, analysed, shared_motion
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.conditional import conditional
 from vgyro.fusion.fixed import median
+from vgyro.fusion.motion_models import Activity, Motion
 from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, smooth
 
@@ -178,13 +180,34 @@ def without_pole(array: ArrayRates, rate: np.ndarray, time_s: float) -> np.ndarr
 
 
 def _in_motion(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Smoothed:
-    resting = bool(array.at_rest.any())
-    motion = shared_motion(array, parameters)
-    rest = fixed_bandwidth(parameters.bandwidth_hz, float(np.mean(signal.variance)), array.rate_hz) if resting else None
+    motion, activity = shared_motion(array, parameters), shared_activity(array, parameters)
     return smooth(
         signal.rate, signal.variance, array.segment, array.rate_hz, motion, signal.colour, parameters.engine,
-        array.at_rest if resting else None, rest,
+        *_standstill(array, parameters, signal.variance), activity,
     )  # fmt: skip
+
+
+def shared_activity(array: ArrayRates, parameters: FilterParameters) -> Activity | None:
+    """How lively the rate is: from the best fused rate, for every row that is smoothed, as its model is."""
+
+    def find() -> Activity | None:
+        known, motion = analysed(array, parameters), shared_motion(array, parameters)
+        variance = known.variance()
+        return find_activity(
+            known.rate(array), variance, array.segment, array.rate_hz, motion, known.variances.colour(),
+            *_standstill(array, parameters, variance),
+        )  # fmt: skip
+
+    return array.once(("activity", parameters), find)
+
+
+def _standstill(
+    array: ArrayRates, parameters: FilterParameters, variance: float | np.ndarray
+) -> tuple[np.ndarray | None, Motion | None]:
+    """Where the board stands still in a recording in motion, and how the rate moves there; None: nowhere."""
+    if not array.at_rest.any():
+        return None, None
+    return array.at_rest, fixed_bandwidth(parameters.bandwidth_hz, float(np.mean(variance)), array.rate_hz)
 
 
 def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> tuple[Smoothed, np.ndarray]:

@@ -19,12 +19,15 @@ from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError
 from vgyro.fusion.motion_choice import choose_motion
 from vgyro.fusion.motion_evidence import wide_start
-from vgyro.fusion.motion_models import UNLIMITED, Dynamics, Motion, SteadyGain, fixed_bandwidth
+from vgyro.fusion.motion_models import UNLIMITED, Activity, Motion, SteadyGain, fixed_bandwidth
+from vgyro.fusion.motion_regimes import Regimes, jumps_at_ends
 
 __all__ = ["Smoothed", "choose_motion", "fixed_bandwidth", "smooth"]
 
 FREE = 1e8
 """Process variance over that of the noise at which neighbours say nothing (1e-8 of the weight)."""
+JUMP_S = 0.1
+"""Means over so long on both sides of an end of standstill show whether the rate jumps there."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,7 @@ def smooth(
     engine: str = "native",
     at_rest: np.ndarray | None = None,
     rest: Motion | None = None,
+    activity: Activity | None = None,
 ) -> Smoothed:
     """The rate given all samples of each gap-free stretch.
 
@@ -64,7 +68,8 @@ def smooth(
     segment : [T], number of the gap-free stretch;  rate_hz : sample rate, Hz
     motion  : how the rate moves;  phi : AR(1) coefficient of the noise, from one sample to the next, 0 ≤ phi < 1
     at_rest, rest : samples [T] over which the rate is the random walk `rest` instead; what the motion has beside a rate
-              (derivative, oscillation) is at zero after them
+              (derivative, oscillation) is at zero after them. Where it jumps at their ends, it is free to
+    activity : how lively the rate is at each sample; None: as its model says. Its levels have no calibration
     raises  : EngineError for samples that cannot be used, DataError for parameters that do not fit
     A stretch without any sample that says something is NaN, with infinite variance.
     """
@@ -78,29 +83,28 @@ def smooth(
         return Smoothed(z.copy(), variance, motion, math.nan, math.nan, 0, motion.text)
     rate, variance = np.empty(len(z)), np.empty(len(z))
     dynamics = _free(motion, mean).dynamics()
-    regimes = [dynamics.transition], [dynamics.process]
-    if standing and rest is not None:
-        F, Q = _at_rest(dynamics, motion, _free(rest, mean), mean / rate_hz * (1.0 + phi) / (1.0 - phi))
-        regimes = [dynamics.transition, F], [dynamics.process, Q]
-    F, Q = (np.stack(one) for one in regimes)
+    regimes = Regimes.of(motion, dynamics, len(z), activity)
+    if standing and rest is not None and at_rest is not None:
+        jumps = jumps_at_ends(z, r, segment, phi, at_rest, max(1, round(JUMP_S * rate_hz)))
+        density = mean / rate_hz * (1.0 + phi) / (1.0 - phi)
+        regimes = regimes.with_rest(motion, dynamics, at_rest, _free(rest, mean), density, jumps, FREE * mean)
     run = engines.get(engine).statespace.smooth
     for part in stretches(segment):
         own = r if r.ndim == 0 else r[part]
-        flags = at_rest[part] if standing and at_rest is not None else None
         start = wide_start(z[part], own, dynamics)
         if start is None:
             rate[part], variance[part] = math.nan, math.inf
             continue
-        model = StateSpace(F, Q, dynamics.reads, dynamics.reads, *start, pole=phi)
-        rate[part], variance[part] = run(z[part], own, model, flags)
-        variance[part] *= motion.calibration
-        if flags is not None and rest is not None:
-            variance[part][flags] *= rest.calibration / motion.calibration
+        model = StateSpace(regimes.transition, regimes.process, dynamics.reads, dynamics.reads, *start, pole=phi)
+        rate[part], variance[part] = run(z[part], own, model, regimes.of_step[part])
+        variance[part] *= regimes.calibration[regimes.of_sample[part]]
     if not np.all(variance > 0.0):
         broken = int(np.argmin(variance > 0.0))
         raise DataError(f"the smoother breaks down: {motion.text}", f"sample {broken}", "choose another motion model")
-    low_pass = motion.model == "random_walk" and not phi and not standing and (r.ndim == 0 or bool(np.all(r == r[0])))
-    text = f"{motion.text}; at rest {rest.text}" if standing and rest is not None else motion.text
+    plain = activity is None and not phi and not standing
+    low_pass = motion.model == "random_walk" and plain and (r.ndim == 0 or bool(np.all(r == r[0])))
+    text = motion.text + (f"; {activity.text}" if activity is not None else "")
+    text += f"; at rest {rest.text}" if standing and rest is not None else ""
     if phi:
         text += f"; noise AR(1), {phi:.3g} a sample"
     limits = (math.nan, math.nan) if motion.model == UNLIMITED else (steady.bandwidth_hz(), steady.noise_bandwidth_hz())
@@ -134,41 +138,3 @@ def _free(motion: Motion, r_mean: float) -> Motion:
     if motion.model != UNLIMITED:
         return motion
     return Motion("random_walk", {"q": FREE * r_mean * motion.rate_hz}, motion.rate_hz)
-
-
-def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition and process of a step to a sample at rest, of the states of `motion`.
-
-    The rate as a whole goes on as the random walk `rest`; derivatives and oscillation end, and begin about zero with
-    what the filter of white noise of this density (deg²/s) knows of them while it moves.
-    """
-    if rest.model != "random_walk":
-        raise DataError(f"the rate at rest is a random walk, not {rest.model}")
-    states = len(dynamics.reads)
-    F, Q = np.eye(states), np.zeros((states, states))
-    Q[0, 0] = rest.parameters["q"] / rest.rate_hz
-    if motion.model in ("acceleration", "jerk", "oscillator"):
-        F[1:] = 0.0
-        F[0] = dynamics.reads
-        Q[1:, 1:] = np.diag(_known_derivatives(motion, dynamics, density)[1:])
-    return F, Q
-
-
-def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np.ndarray:
-    """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
-
-    With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero;
-    of two of them all that is known is how large the derivatives are.
-    """
-    values = motion.parameters
-    if "second_hz" in values:
-        return np.diagonal(dynamics.stationary)
-    if motion.model == "oscillator":
-        q = 4.0 * values["damping"] * (2.0 * math.pi * values["frequency_hz"]) ** 3 * values["sd"] ** 2
-        factors = np.array([0.0, 0.0, math.sqrt(2.0)])
-    else:
-        q = values["q"]
-        factors = np.array([2.0, 3.0, 2.0]) if motion.model == "jerk" else np.full(2, math.sqrt(2.0))
-    w = (q / density) ** (1.0 / (6.0 if motion.model == "jerk" else 4.0))
-    order = dynamics.order
-    return density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)

@@ -18,7 +18,7 @@ def log_likelihood(
 
     z      : array [T], deg/s;  r : variance of its noise, (deg/s)², one or [T]; infinite: z says nothing there
     skip   : first innovations that are not counted: with a wide start it is the likelihood given those samples
-    regime : array [T], 0 or 1: which transition and process lead to each sample; None: the first
+    regime : array [T]: which transition and process lead to each sample; None: the first
     returns : -½Σ(log 2π + log f + v²/f), and the number of terms
     raises : EngineError that names the first sample that cannot be used
     Schweppe (1965), IEEE Trans. Inf. Theory 11, 61-70.

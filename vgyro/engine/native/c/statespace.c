@@ -78,7 +78,7 @@ VG_INLINE int update(const int n, const int coloured, const double *reads, doubl
     return 1;
 }
 
-VG_INLINE ptrdiff_t regime_of(const vg_measured *m, ptrdiff_t t) { return m->regime == NULL ? 0 : m->regime[t] != 0; }
+VG_INLINE ptrdiff_t regime_of(const vg_measured *m, ptrdiff_t t) { return m->regime == NULL ? 0 : m->regime[t]; }
 
 VG_INLINE void predict_to(const int n, const vg_statespace *s, const vg_measured *m, ptrdiff_t t, vg_belief *b) {
     ptrdiff_t place = regime_of(m, t) * n * n;

@@ -21,7 +21,7 @@ typedef struct {
     int coloured;
 } vg_statespace;
 
-/* z [samples]; noise: r at noise + t·noise_step, infinite where z says nothing; regime [samples] (0 or 1), of the step
+/* z [samples]; noise: r at noise + t·noise_step, infinite where z says nothing; regime [samples], of the step
    to each sample, or NULL for 0. */
 typedef struct {
     const double *z, *noise;
