@@ -46,8 +46,9 @@ def faults_part(dataset: DatasetPart, array: ArrayPart) -> Markup:
     ]
     rows = [_row(row) for row in found[:MOST_ROWS]]
     more = [f"{len(found) - MOST_ROWS} more events are in faults.parquet"] if len(found) > MOST_ROWS else []
-    caption = "Faults: stretches in which one gyro is at fault, and is left out by the methods that need `faults`"
-    return join(heading("Faults", 4), render_table(columns, rows, caption, [words, *more]))
+    caption = "Stretches in which one gyro is at fault; methods that need “faults” leave it out there"
+    table_of = render_table(columns, rows, caption, more)
+    return join(heading("Faults", 4), table_of, paragraph(words, "note"))
 
 
 def fault_times(array: ArrayPart) -> list[float]:

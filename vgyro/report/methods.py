@@ -90,7 +90,9 @@ PROPERTIES = (
     Column("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group=RESPONSE),
     Column("known", numeric=False, hint="how the four are known", group=RESPONSE),
 )
-FAMILIES = {"baseline": "Baselines", "paper": "Methods of the papers", "ours": "Ours"}
+# The recommended rows first: of some forty they are the ones to look for.
+FAMILIES = {"ours": "Methods of vgyro", "baseline": "Baselines", "paper": "Methods of the papers"}
+FIRST = {"recommended": 0, "recommended_unsmoothed": 1}
 MOST_WIDE = 7
 LIMITS = "Below each figure: its limits."
 FACTOR_WORDS = (
@@ -210,6 +212,7 @@ def _rows(
         rows += [Row(heading="Single gyros"), *(Row((Cell(gyro), *of_gyro(gyro))) for gyro in array.gyros)]
     for family, heading in FAMILIES.items():
         mine = [method for method in methods if method["family"] == family]
+        mine.sort(key=lambda method: FIRST.get(str(method["method"]), len(FIRST)))
         rows += [Row(heading=heading)] if mine else []
         rows += [_method_row(method, of_method, width, notes) for method in mine]
     return rows

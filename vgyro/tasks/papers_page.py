@@ -183,7 +183,7 @@ def _claims(verdicts: Sequence[tuple[Claim, Verdict]]) -> Markup:
             "Each claim is decided by a rule on figures. A figure with limits decides only if both lie on one side of "
             "the bound. A verdict says what the equations and the simulated board show, not what the real board did."
         ),
-        tables.render_table([tables.Column(title, numeric=False) for title in titles], rows),
+        tables.render_table([tables.Column(title, numeric=False, wide=title == "reason") for title in titles], rows),
     )
 
 

@@ -12,14 +12,21 @@ from vgyro.report import html
 from vgyro.report.plots import Axis, Curve, curve_plot
 from vgyro.storage.tables import read_columns
 
-# Column of the Allan table → label; the papers' own figures show these.
+OWN = {"recommended": "recommended (vgyro)", "recommended_unsmoothed": "recommended, not smoothed (vgyro)"}
+# Column of the Allan table → label; the papers' own figures show these, but for ours.
 SERIES: dict[str, dict[str, str]] = {
     "jiang2012": {
         "average": "simple average",
         "jiang_random_walk": "random walk",
         "jiang_markov": "first-order Markov",
+        **OWN,
     },
-    "liu2015": {"average": "simple average", "jiang_markov": "Kalman filter [11]", "dcc_in_sample[level]": "DCC"},
+    "liu2015": {
+        "average": "simple average",
+        "jiang_markov": "Kalman filter [11]",
+        "dcc_in_sample[level]": "DCC",
+        **OWN,
+    },
 }
 WEIGHTS_OF = ("level", "dcc", "in_sample")
 STATIC = "static"
