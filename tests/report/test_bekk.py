@@ -1,4 +1,4 @@
-"""DCC against its alternatives: figures of the made-up windows of conftest, counted by hand."""
+"""DCC against its alternatives: figures of the made-up windows of bench_volatility, counted by hand."""
 
 from __future__ import annotations
 
