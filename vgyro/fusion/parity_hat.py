@@ -154,7 +154,16 @@ def _without_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
 
 def _solve(moments: BlockMoments, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
     """Variances [N] of the greatest likelihood of the parity space, from the N-cornered hat on; blocks `used` [M]."""
-    square = _without_slow(moments, used)
+    return most_likely(_without_slow(moments, used), moments, used, correlation)
+
+
+def second_moments(moments: BlockMoments) -> np.ndarray:
+    """Second moments [M, N, N] a sample, (deg/s)², of the differences less their slow part."""
+    return _without_slow(moments, np.ones(len(moments.start), dtype=bool))
+
+
+def most_likely(square: np.ndarray, moments: BlockMoments, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
+    """Variances [N] of the greatest likelihood for second moments [M, N, N] a sample of the blocks `used` [M]."""
     totals, counts, kept = [], [], []
     for pattern, rows in patterns(moments.excluded):
         mine = rows[used[rows]]

@@ -4,6 +4,7 @@
 2. R_t and slow errors b from the differences between the gyros (vgyro.fusion.analysed).
 3. u = minimum-variance weights of R_t;  z = u'(y - b).
 4. The motion: model and parameters by likelihood, two-sided smoother of z with u'R_t·u (vgyro.fusion.smoother).
+   Where the colours of the gyros' noise differ, R_t is scaled to the band that it passes (vgyro.fusion.parity_band).
 5. The sensor's low-pass, where parity shows its colour in the noise, is undone on the smoothed rate.
 
 The posterior variance of a sample is that of 4 plus that of u'(b - its estimate) of 2.
@@ -11,11 +12,16 @@ The posterior variance of a sample is that of 4 plus that of u'(b - its estimate
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from vgyro.fusion.analysed import analysed
-from vgyro.fusion.array import ArrayRates, FilterParameters, Fused
-from vgyro.fusion.slow import slow_variance
+from vgyro.errors import DataError
+from vgyro.fusion.analysed import Analysed, analysed, shared_motion
+from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.motion_models import UNLIMITED, SteadyGain, fixed_bandwidth
+from vgyro.fusion.parity_band import in_band
+from vgyro.fusion.slow import combined_without, slow_variance
 from vgyro.fusion.smoothed import Signal, smoothed
 from vgyro.fusion.weights import min_variance_weights
 
@@ -23,16 +29,33 @@ from vgyro.fusion.weights import min_variance_weights
 def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """All of it, smoothed, with the posterior standard deviation of each sample."""
     known = analysed(array, parameters)
+    variances, note = in_band(array, known.variances, passed_hz(array, parameters, known))
+    weights = known.weights if not note else variances.sample_weights(parameters.engine)
+    shares = variances.weights(parameters.engine)
     signal = Signal(
-        known.rate(array),
-        known.variance(),
-        known.variances.colour(),
-        known.weights,
-        known.note,
-        known.slow.at_samples(slow_variance(known.weights, known.slow)),
+        combined_without(array, weights, known.slow),
+        known.variances.combined_variance(shares)[variances.block_of_sample()],
+        known.variances.colour(shares),
+        weights,
+        "; ".join(filter(None, [known.note, note])),
+        known.slow.at_samples(slow_variance(weights, known.slow)),
         undo_pole=True,
     )
     return smoothed(array, parameters, signal)
+
+
+def passed_hz(array: ArrayRates, parameters: FilterParameters, known: Analysed) -> float:
+    """Noise-equivalent bandwidth, one-sided, Hz, of the smoother; NaN: it is not limited, or not known."""
+    mean, colour = float(np.mean(known.variance())), known.variances.colour()
+    try:
+        if parameters.in_motion:
+            motion = shared_motion(array, parameters)
+        else:
+            motion, colour = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz), 0.0
+        return SteadyGain(motion, mean, colour).noise_bandwidth_hz() if motion.model != UNLIMITED else math.nan
+    except (DataError, CannotRun):
+        # The smoother will say so.
+        return math.nan
 
 
 def recommended_unsmoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
