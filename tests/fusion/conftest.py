@@ -1,9 +1,14 @@
-"""Arrays of simulated gyros for the fusion tests."""
+"""Arrays of simulated gyros for the fusion tests; slow_gyros.py, beside this file, is no package."""
+
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from vgyro.fusion import ArrayNoise, ArrayRates
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 ARW = 6.17 / 60.0
 

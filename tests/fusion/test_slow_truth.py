@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import t as student
+from slow_gyros import ARW, EQUAL, MOVING, RRW, SEEDS, simulated
 
-from vgyro.fusion import ArrayNoise, ArrayRates, CannotRun, FilterParameters
+from vgyro.fusion import ArrayNoise, CannotRun
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.slow import combined_without, slow_errors, slow_variance
 from vgyro.fusion.slow_blocks import SlowBlocks
@@ -17,31 +18,6 @@ from vgyro.fusion.slow_choice import _Search
 from vgyro.fusion.slow_model import Evidence, Walk
 from vgyro.fusion.slow_rows import frequency_weights, weights_at
 from vgyro.units import rrw_deg_s_rt_s
-
-MOVING = FilterParameters(in_motion=True)
-SEEDS = range(8)
-ARW = np.array([0.01, 0.02, 0.03, 0.01, 0.02, 0.03])
-RRW = np.array([3.0, 1.0, 2.0, 0.5, 1.0, 0.2]) * 1e-3
-EQUAL = np.full(6, 1 / 6)
-
-
-@pytest.fixture
-def simulated():
-    """simulated(seconds, seed, ...) → recording in motion at 1 Hz, and the true biases [T, N]."""
-
-    def make(seconds, seed, arw=ARW, rrw=RRW, spread=0.1, at_rest=None, temperature=None, slopes=0.0):
-        rng, gyros = np.random.default_rng(seed), len(arw)
-        bias = spread * rng.standard_normal(gyros) + np.cumsum(rng.standard_normal((seconds, gyros)) * rrw, axis=0)
-        if temperature is not None:
-            bias = bias + slopes * (temperature - temperature.mean())[:, None]
-        at_rest = np.zeros(seconds, dtype=bool) if at_rest is None else at_rest
-        motion = np.where(at_rest, 0.0, 20.0 * np.sin(np.arange(seconds) / 3.0))
-        rate = bias + motion[:, None] + rng.standard_normal((seconds, gyros)) * arw
-        noise = ArrayNoise(arw, rrw, np.eye(gyros))
-        segment = np.zeros(seconds, dtype=int)
-        return ArrayRates(rate, 1.0, segment, at_rest, noise, temperature=temperature), bias
-
-    return make
 
 
 def interval(values):
@@ -59,7 +35,7 @@ def test_weights_at_a_frequency():
         np.testing.assert_allclose(weights, 1 / density / np.sum(1 / density), rtol=1e-9)
 
 
-def test_gain_of_one_gyro(simulated):
+def test_gain_of_one_gyro():
     # Expected: weights_at: in the middle of a long recording sines of one gyro alone come out with its weights there.
     arw, rrw, cycles = np.array([0.05, 0.1, 0.08]), np.array([1.5, 0.5, 1.0]) * 1e-3, np.array([8, 30, 150])
     array, _ = simulated(16_000, 3, arw, rrw)
@@ -79,7 +55,7 @@ def test_gain_of_one_gyro(simulated):
     assert np.ptp(expected, axis=0).max() > 0.3
 
 
-def test_a_motion_passes_the_row(simulated):
+def test_a_motion_passes_the_row():
     # Expected: the motion, to rounding: Σw = 1 at every frequency.
     array, _ = simulated(3000, 1)
     motion = np.cumsum(np.random.default_rng(0).standard_normal(3000))
@@ -90,7 +66,7 @@ def test_a_motion_passes_the_row(simulated):
 
 
 @pytest.mark.full
-def test_less_drift_than_inverse_variance(simulated):
+def test_less_drift_than_inverse_variance():
     # Expected: true rate known. Inverse variance weights the white noise alone; the gyros drift otherwise than that.
     ratios = []
     for seed in SEEDS:
@@ -105,7 +81,7 @@ def test_less_drift_than_inverse_variance(simulated):
     assert interval(ratios)[1] < 1.0
 
 
-def test_error_between_two_rests(simulated):
+def test_error_between_two_rests():
     # Expected: the walk that all share is pinned at both ends, a Brownian bridge: the mean of its error over the motion
     # of T has the variance k²T/12 + P/2, at the middle k²T/4 + P/2; k = K/√N, n = ARW/√N, and P = k·n·coth(kτ/n) is
     # what a rest of τ leaves open at its end. 200 recordings: 10 % is the standard deviation of a variance.
@@ -129,7 +105,7 @@ def test_error_between_two_rests(simulated):
     assert stated == pytest.approx(k**2 * motion / 4 + end, rel=0.02)
 
 
-def test_errors_are_as_large_as_stated_between_anchors(simulated):
+def test_errors_are_as_large_as_stated_between_anchors():
     # Expected: error²/variance of 1 on average, over the whole recording (NEES), for two sets of weights.
     at_rest = np.zeros(300, dtype=bool)
     at_rest[:20], at_rest[140:160], at_rest[-20:] = True, True, True
@@ -143,7 +119,7 @@ def test_errors_are_as_large_as_stated_between_anchors(simulated):
         assert low < 1.0 < high
 
 
-def test_differences_are_as_large_as_stated_in_motion(simulated):
+def test_differences_are_as_large_as_stated_in_motion():
     # Expected: NEES of 1 on average, of combinations in which what all share has no part.
     weights = np.array([0.5, 0.5, 0.0, 0.0, -0.5, -0.5])
     ratios = []
@@ -155,7 +131,7 @@ def test_differences_are_as_large_as_stated_in_motion(simulated):
     assert low < 1.0 < high
 
 
-def test_the_common_bias_lies_in_its_limits(simulated):
+def test_the_common_bias_lies_in_its_limits():
     # Expected: the mean bias of all gyros within 1.96 s.d. in about 95 % of 300 recordings (binomial s.d. 1.3 %),
     # though nothing but the gyros' own spread says how large it may be.
     inside = []
@@ -166,7 +142,7 @@ def test_the_common_bias_lies_in_its_limits(simulated):
     assert np.mean(inside) == pytest.approx(0.95, abs=0.04)
 
 
-def common_bias(simulated, spread, seconds, off=0.0):
+def common_bias(spread, seconds, off=0.0):
     """error²/variance of the mean bias of the gyros that are not `off` [200], and the mean of its squared error.
 
     Constant biases, white noise of 0.1 deg/s per second's mean, in 30 blocks.
@@ -186,24 +162,24 @@ def common_bias(simulated, spread, seconds, off=0.0):
 @pytest.mark.full
 @pytest.mark.parametrize("seconds", [600, 3600])
 @pytest.mark.parametrize("spread", [0.005, 0.05, 0.5])
-def test_the_common_bias_is_as_large_as_stated(simulated, spread, seconds):
+def test_the_common_bias_is_as_large_as_stated(spread, seconds):
     # Expected: NEES of 1 (0.8 to 1.2), within 1.96 s.d. in 95 % (binomial s.d. 1.5 %) of 200 recordings, whether the
     # gyros' spread is above or below the noise of their means, 0.0041 and 0.0017 deg/s.
-    ratios, _ = common_bias(simulated, spread, seconds)
+    ratios, _ = common_bias(spread, seconds)
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.2 + 1.96 * np.std(ratios) / np.sqrt(200))
     assert np.mean(ratios < 1.96**2) == pytest.approx(0.95, abs=0.04)
 
 
 @pytest.mark.full
-def test_the_common_bias_with_one_gyro_far_off(simulated):
+def test_the_common_bias_with_one_gyro_far_off():
     # Expected: the error of five gyros alone, the spread over √5, and limits that hold. 200 recordings: an s.d. to 5 %.
-    ratios, square = common_bias(simulated, 0.005, 3600, off=1.0)
+    ratios, square = common_bias(0.005, 3600, off=1.0)
     assert np.sqrt(square) == pytest.approx(0.005 / np.sqrt(5), rel=0.15)
     assert np.mean(ratios < 1.96**2) > 0.9
 
 
 @pytest.mark.parametrize("scale", [0.0, 0.01])
-def test_scale_errors_are_not_taken_for_biases(simulated, scale):
+def test_scale_errors_are_not_taken_for_biases(scale):
     # Expected: the biases as they are known without motion of 20 deg/s r.m.s. about 0.4 Hz; 1 % of it is ten times the
     # noise of a block.
     shares = scale * np.array([1.0, -1.0, 0.5, -0.5, 1.5, -1.5])
@@ -218,7 +194,7 @@ def test_scale_errors_are_not_taken_for_biases(simulated, scale):
     np.testing.assert_allclose(slow.covariance, still.covariance, rtol=0.2)
 
 
-def test_one_gyro_far_off_does_not_drag_the_rest(simulated):
+def test_one_gyro_far_off_does_not_drag_the_rest():
     # Expected: the rate that the other five give without it, within their own s.d. of the common bias.
     array, bias = simulated(200, 2)
     off = replace(array, rate=array.rate + np.array([0, 0, 0, 5.0, 0, 0]))
@@ -232,66 +208,7 @@ def test_one_gyro_far_off_does_not_drag_the_rest(simulated):
     assert slow.bias[0, 3] - bias[0, 3] == pytest.approx(5.0, abs=0.2)
 
 
-@pytest.mark.full
-def test_temperature_slopes_are_found(simulated):
-    # Expected: differences of the true slopes, (found - true)/s.d. of mean square 1 over 8 seeds and 5 differences; and
-    # with standstill their mean as well.
-    slopes = np.array([0.03, -0.02, 0.01, 0.05, -0.04, 0.0])
-    temperature = 30.0 + 6.0 * np.sin(np.arange(600) / 30.0)
-    at_rest = np.arange(600) % 150 < 30
-    squares, common = [], []
-    for seed in SEEDS:
-        array, _ = simulated(600, seed, temperature=temperature, slopes=slopes)
-        found = slow_errors(array, MOVING, ARW**2).temperature
-        contrast = np.diff(np.eye(6), axis=0)
-        error, covariance = contrast @ (found.slope - slopes), contrast @ found.covariance @ contrast.T
-        squares.append(error @ np.linalg.solve(covariance, error) / 5)
-        resting, _ = simulated(600, seed, at_rest=at_rest, temperature=temperature, slopes=slopes)
-        found = slow_errors(resting, MOVING, ARW**2).temperature
-        common.append((found.slope - slopes).mean() / np.sqrt(EQUAL @ found.covariance @ EQUAL))
-    # chi² of 40 degrees of freedom over 40, 99 %: 0.55 to 1.65; of 8 over 8: 0.17 to 2.7.
-    assert 0.55 < np.mean(squares) < 1.65
-    assert 0.17 < np.mean(np.square(common)) < 2.7
-
-
-def test_shared_slope_at_rest_as_a_whole(simulated):
-    # Expected: the mean of the true slopes, within its s.d. (mean square of 8 values: chi², 0.17 to 2.7 at 99 %), for a
-    # rate that is one constant of any size, and that constant is left in the result.
-    temperature = 30.0 + 6.0 * (1 - np.exp(-np.arange(600) / 150.0))
-    slopes = np.array([0.03, -0.02, 0.01, 0.05, -0.04, 0.02])
-    errors = []
-    for seed in SEEDS:
-        array, _ = simulated(
-            600, seed, spread=0.02, at_rest=np.ones(600, dtype=bool), temperature=temperature, slopes=slopes
-        )
-        walk = Walk(RRW)
-        found = slow_errors(array, FilterParameters(), ARW**2, walk=walk)
-        errors.append(
-            (found.temperature.slope - slopes) @ EQUAL / np.sqrt(EQUAL @ found.temperature.covariance @ EQUAL)
-        )
-        moved = replace(array, rate=array.rate + 7.0)
-        again = slow_errors(moved, FilterParameters(), ARW**2, walk=walk)
-        difference = combined_without(moved, EQUAL, again) - combined_without(array, EQUAL, found)
-        np.testing.assert_allclose(difference, 7.0, atol=1e-9)
-        # In motion nothing says so: the s.d. is larger by far.
-        turning = slow_errors(replace(array, at_rest=~array.at_rest), MOVING, ARW**2, walk=walk)
-        assert EQUAL @ turning.temperature.covariance @ EQUAL > 4 * EQUAL @ found.temperature.covariance @ EQUAL
-    assert 0.17 < np.mean(np.square(errors)) < 2.7
-
-
-@pytest.mark.full
-def test_drift_is_not_taken_for_temperature(simulated):
-    # Expected: no slopes, for there are none, though the temperature drifts as the biases do. K is not known well.
-    temperature = 30.0 + 10.0 * np.linspace(0, 1, 1000) ** 0.5
-    for seed in SEEDS:
-        array, _ = simulated(1000, seed, temperature=temperature)
-        array = replace(array, noise=replace(array.noise, rrw=RRW / 3))
-        slow = slow_errors(array, MOVING, ARW**2)
-        assert slow.temperature is None
-        assert "not regressed on the temperature" in slow.note
-
-
-def test_walks_that_fade(simulated):
+def test_walks_that_fade():
     # Expected: Gauss-Markov biases of the time 30 s are told from walks, with a level that is theirs throughout: the
     # stated variance of the common bias is the same at both ends, and differences are within theirs (NEES of about 1).
     array, _ = simulated(1500, 5, spread=0.0, rrw=np.zeros(6))
@@ -310,15 +227,7 @@ def test_walks_that_fade(simulated):
     )
 
 
-def test_when_the_temperature_is_not_used(simulated):
-    array, _ = simulated(300, 1, temperature=30.0 + 0.4 * np.sin(np.arange(300) / 30.0))
-    assert "temperature within 0.8 K: not regressed on" in slow_errors(array, MOVING, ARW**2).note
-    assert "temperature is off" in slow_errors(array, replace(MOVING, temperature="off"), ARW**2).note
-    holes = replace(array, temperature=np.where(np.arange(300) < 5, np.nan, array.temperature))
-    assert "temperature unknown in 5 of 300 blocks" in slow_errors(holes, MOVING, ARW**2).note
-
-
-def test_slope_of_the_likelihood(simulated):
+def test_slope_of_the_likelihood():
     # Expected: differences of the likelihood itself (scipy), with and without regressors of the temperature.
     temperature = 30.0 + 6.0 * np.sin(np.arange(400) / 30.0)
     array, _ = simulated(400, 4, temperature=temperature, slopes=np.linspace(0, 0.1, 6))
@@ -337,7 +246,7 @@ def test_slope_of_the_likelihood(simulated):
 
 
 @pytest.mark.full
-def test_random_walks_by_likelihood(simulated):
+def test_random_walks_by_likelihood():
     # Expected: the true K. Given three times as large, or not at all; the multiplier within 20 % on average.
     known, unknown = [], []
     for seed in SEEDS:
@@ -351,7 +260,7 @@ def test_random_walks_by_likelihood(simulated):
         assert np.mean(found) == pytest.approx(1.0, abs=0.2)
 
 
-def test_a_gyro_that_walks_faster_than_was_known(simulated):
+def test_a_gyro_that_walks_faster_than_was_known():
     # Expected: its K within a factor of 1.5 of the truth, and an error nearly that of who knows; as given, far larger.
     truth = np.where(np.arange(6) == 3, 2e-2, 5e-4)
     ratios, worse = [], []
@@ -371,7 +280,7 @@ def test_a_gyro_that_walks_faster_than_was_known(simulated):
     assert np.mean(worse) > 3.0
 
 
-def test_a_bias_that_jumps_while_its_gyro_is_at_fault(simulated):
+def test_a_bias_that_jumps_while_its_gyro_is_at_fault():
     # Expected: the bias after an event that is left out is found at once, within its s.d.
     array, bias = simulated(600, 1)
     jumped = np.zeros((600, 6))
@@ -386,14 +295,14 @@ def test_a_bias_that_jumps_while_its_gyro_is_at_fault(simulated):
     assert np.all(sd[after] < 0.05)
 
 
-def test_the_row_needs_the_white_noise(simulated):
+def test_the_row_needs_the_white_noise():
     array, _ = simulated(100, 1)
     with pytest.raises(CannotRun, match="noise covariance"):
         frequency_weights(replace(array, noise=replace(array.noise, arw=np.full(6, np.nan))), MOVING)
 
 
 @pytest.mark.full
-def test_a_day_of_blocks(simulated):
+def test_a_day_of_blocks():
     # Expected: 86,400 blocks of six gyros, with temperature, in less than 15 s of one processor.
     temperature = 30.0 + 6.0 * np.sin(np.arange(86_400) / 9000.0)
     array, _ = simulated(86_400, 1, temperature=temperature, slopes=np.linspace(0, 0.1, 6))
