@@ -32,10 +32,10 @@ raw/demo/dataset.yaml: | $(READY)
 	vgyro simulate demo --out raw/demo
 
 test: $(READY)  ## every test but the long Monte-Carlo ones
-	pytest -n $(CORES) -m "not full"
+	pytest -n $(CORES) --dist loadgroup -m "not full"
 
 test-full: $(READY)  ## every test
-	pytest -n $(CORES) --timeout 7200
+	pytest -n $(CORES) --dist loadgroup --timeout 7200
 
 lint: $(READY)  ## formatting, style, types, layers, workflow
 	ruff check .

@@ -1,4 +1,7 @@
-"""A lab of its own for every test module: a copy of the project in an empty folder, with a small simulated data set."""
+"""A lab of its own for every test module: a copy of the project in an empty folder, with a small simulated data set.
+
+Each module is one group of xdist (`--dist loadgroup` in the Makefile): its pipeline runs once, in one worker.
+"""
 
 import hashlib
 import os
