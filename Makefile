@@ -6,6 +6,8 @@ CORES ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+# Whole files, in their order: what a module shares is then made once.
+SPREAD := --dist loadfile --no-loadscope-reorder
 LOCK := requirements/lock.txt
 NATIVE := $(wildcard vgyro/engine/native/*.pyx vgyro/engine/native/c/*)
 
@@ -32,10 +34,10 @@ raw/demo/dataset.yaml: | $(READY)
 	vgyro simulate demo --out raw/demo
 
 test: $(READY)  ## every test but the long Monte-Carlo ones
-	pytest -n $(CORES) --dist loadgroup -m "not full"
+	pytest -n $(CORES) $(SPREAD) -m "not full"
 
 test-full: $(READY)  ## every test
-	pytest -n $(CORES) --dist loadgroup --timeout 7200
+	pytest -n $(CORES) $(SPREAD) --timeout 7200
 
 lint: $(READY)  ## formatting, style, types, layers, workflow
 	ruff check .

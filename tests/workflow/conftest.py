@@ -1,6 +1,6 @@
 """A lab of its own for every test module: a copy of the project in an empty folder, with a small simulated data set.
 
-Each module is one group of xdist (`--dist loadgroup` in the Makefile): its pipeline runs once, in one worker.
+`make test` sends whole files to its workers (`--dist loadfile`), so that each of these pipelines runs once.
 """
 
 import hashlib

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("bad_input"), pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.workflow, pytest.mark.timeout(1200)]
 
 MANIFEST = "board: {board}\nrecordings:\n  - name: static\n    kind: static\n    files: [{file}]\n"
 

@@ -16,7 +16,7 @@ import pytest
 
 from vgyro.fusion import METHODS
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("engines"), pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.workflow, pytest.mark.timeout(1800)]
 
 FITTED = ("dcc_", "ccc_", "waegli_guerrier")
 # The EKF, the bank and the other smoothed rows run on the same functions of the engines, which are compared sample by

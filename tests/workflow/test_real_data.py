@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("real_data"), pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.workflow, pytest.mark.timeout(1800)]
 
 BOARD_Y = ["imu1_gy", "imu3_gy", "imu5_gy", "imu7_gy", "imu2_gx", "imu4_gx", "imu6_gx", "imu8_gx"]
 BOARD_X = ["imu1_gx", "imu3_gx", "imu5_gx", "imu7_gx", "imu2_gy", "imu4_gy", "imu6_gy", "imu8_gy"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("reproducible"), pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.workflow, pytest.mark.timeout(1200)]
 
 
 def jobs_planned(output: str) -> set[str]:
