@@ -216,3 +216,34 @@ def test_arch_verdicts_are_said_together(dataset: DatasetPart) -> None:
         "no verdict (no variance): g4.",
         "ARCH effects of the level (axis z, rest): nothing: solo.",
     ]
+
+
+def with_curves(dataset: DatasetPart, short: dict[str, float], second: dict[str, float]) -> DatasetPart:
+    """The data set with Allan deviations of methods of rest-x, below 0.5 s and from there on, 5 % known."""
+    array = array_of(dataset)
+    table = {name: column.copy() for name, column in array.tables["allan"].items()}
+    for series in short:
+        mask = table["series"] == series
+        assert mask.any()
+        value = np.where(table["tau"][mask] < 0.5, short[series], second[series])
+        for name, spread in (("deviation", 1.0), ("low", 0.95), ("high", 1.05)):
+            table[name][mask] = value * spread
+    return with_array(dataset, array, {"allan": table})
+
+
+@pytest.mark.parametrize(("second", "said"), [(0.0008, True), (0.00098, False), (0.0012, False)])
+def test_order_that_depends_on_the_averaging_time(dataset, second, said):
+    # The rule: the lower limit of the one that is best at the shortest time, 0.00095 at 1 s, above the other's.
+    array = array_of(dataset)
+    full = [row["column"] for row in array.methods() if row["column"] and not np.isfinite(row["bandwidth_hz"])]
+    assert {"average", "median"} <= set(full)
+    worst = dict.fromkeys(full, 1.0)
+    made = with_curves(
+        dataset, {**worst, "average": 0.01, "median": 0.02}, {**worst, "average": 0.001, "median": second}
+    )
+    found = [
+        one.text for one in conclude(made) if "depends on the averaging time" in one.text and "axis x, rest" in one.text
+    ]
+    assert len(found) == said
+    if said:
+        assert "0.80 of the former's" in found[0]

@@ -9,9 +9,9 @@ import numpy as np
 
 from vgyro.figure import Figure
 from vgyro.report.figure_cells import says_limited
-from vgyro.report.model import ArrayPart, DatasetPart, Value
+from vgyro.report.model import ArrayPart, DatasetPart, Value, rows_of
 from vgyro.report.moved import failing
-from vgyro.report.noise import method_labels
+from vgyro.report.noise import OVERLAPPING, method_labels
 from vgyro.report.numbers import plain, significant
 from vgyro.report.sentences import Conclusion, factor, interval
 
@@ -20,6 +20,8 @@ FAIR, RAW = "if_sigma_equal", "if_sigma"
 FACTORS = ((FAIR, "1σ at equal bandwidth"), ("if_arw", "N"), ("if_bias_drift", "bias drift"))
 RAW_FACTOR = (RAW, "1σ")
 IN_SAMPLE = "_in_sample"
+AVERAGING_S = 1.0
+"""Weights that are best for the samples need not be for means over so long."""
 OFFLINE = " (offline)"
 BEST_RULES = (
     "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording at "
@@ -28,6 +30,9 @@ BEST_RULES = (
     "best causal one is named, too. A smoother whose shape is not that of a low-pass run once, or forward and back, is "
     "not compared by 1σ or N.",
     "In motion: the least 1σ of the error against the reference, in-sample weights left out again.",
+    "Which method is best depends on the averaging time: of those that keep the full bandwidth, the one with the least "
+    "Allan deviation at the shortest averaging time does not have the least at 1 s, and the lower limit of its own there "
+    "is above that of the other. The spectra of the gyros differ in shape, then.",
     "DCC beats the simple baselines (average, median, fixed inverse variance) where the lower limit of its factor is "
     "above the best of theirs.",
 )
@@ -102,6 +107,7 @@ def rest_sentences(dataset: DatasetPart, array: ArrayPart) -> list[Conclusion]:
     if OFFLINE in listed:
         causal = _listed(array, causal=True)
         found += [Conclusion(f"Best causal method at rest ({place}): {causal}.", "", array.anchor)] if causal else []
+    found += _averaging_sentence(array, place)
     compared = [text for figure, words in factors_of(array) if (text := _dcc_words(array, figure, words))]
     if compared:
         found.append(Conclusion(f"Causal DCC ({place}) {'; '.join(compared)}.", "", array.anchor))
@@ -115,6 +121,33 @@ def _recommended(array: ArrayPart, place: str) -> list[Conclusion]:
     if not said:
         return []
     return [Conclusion(f"Recommended virtual gyro ({place}): improvement factor {', '.join(said)}.", "", array.anchor)]
+
+
+def _averaging_sentence(array: ArrayPart, place: str) -> list[Conclusion]:
+    """Where the best method of full bandwidth at the shortest averaging time is not the best at 1 s."""
+    limited = {row["column"] for row in array.methods() if np.isfinite(row["bandwidth_hz"])}
+    failed = failing(array)
+    columns = {row["column"]: (row["method"], row["definition"]) for row in array.methods() if row["column"]}
+    labels = _labels(array)
+    curves: dict[float, dict[Name, tuple[float, float]]] = {}
+    for row in rows_of(array.tables.get("allan", {})):
+        name = columns.get(row["series"])
+        if row["kind"] != OVERLAPPING or name is None or name in failed or row["series"] in limited:
+            continue
+        if not name[0].endswith(IN_SAMPLE) and np.isfinite(row["deviation"]):
+            curves.setdefault(float(row["tau"]), {})[name] = (float(row["deviation"]), float(row["low"]))
+    if not curves:
+        return []
+    short, second = min(curves), min(curves, key=lambda tau: abs(tau - AVERAGING_S))
+    fast, slow = (min(curves[tau], key=lambda name: curves[tau][name][0]) for tau in (short, second))
+    at_second = curves[second]
+    if second < AVERAGING_S / 2 or fast not in at_second or not at_second[fast][1] > at_second[slow][0]:
+        return []
+    ratio = significant(at_second[slow][0] / at_second[fast][0], 2)
+    text = f"Which method is best depends on the averaging time ({place}): of those that keep the full bandwidth "
+    text += f"{labels[fast]} has the least Allan deviation at {significant(short, 2)} s, {labels[slow]} at "
+    text += f"{significant(second, 2)} s, {ratio} of the former's"
+    return [Conclusion(f"{text}.", "warn", array.anchor)]
 
 
 def _listed(array: ArrayPart, *, causal: bool = False) -> str:
