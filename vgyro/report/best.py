@@ -31,8 +31,8 @@ BEST_RULES = (
     "not compared by 1σ or N.",
     "In motion: the least 1σ of the error against the reference, in-sample weights left out again.",
     "Which method is best depends on the averaging time: of those that keep the full bandwidth, the one with the least "
-    "Allan deviation at the shortest averaging time does not have the least at 1 s, and the lower limit of its own there "
-    "is above that of the other. The spectra of the gyros differ in shape, then.",
+    "Allan deviation at the shortest averaging time has not the least at 1 s, and the lower limit of its own there is "
+    "above that of the other. The spectra of the gyros differ in shape, then.",
     "DCC beats the simple baselines (average, median, fixed inverse variance) where the lower limit of its factor is "
     "above the best of theirs.",
 )
