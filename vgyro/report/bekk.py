@@ -21,18 +21,19 @@ COLUMNS = (
     Column("", numeric=False),
     Column("windows", hint="of the sample, in which all four models could be compared"),
     Column("parameters"),
-    Column("log-likelihood", hint="median of the windows, less that of DCC", group=BY_BIC),
-    Column("BIC", hint="median of the windows, less that of DCC; less is better", group=BY_BIC),
+    Column("Δ log-likelihood", hint="median of the windows, less that of DCC", group=BY_BIC),
+    Column("Δ BIC", hint="median of the windows, less that of DCC; less is better", group=BY_BIC),
     Column("least BIC", hint="windows in which it has the least BIC of the four", group=BY_BIC),
     Column("1σ", "deg/s", hint="r.m.s. of the fused r_t over the step after the window", group=BY_WEIGHTS),
     Column("1σ / DCC", hint="geometric mean over the windows, least and greatest", group=BY_WEIGHTS),
     Column("less than DCC", hint="windows in which its 1σ is less than that of DCC", group=BY_WEIGHTS),
 )
 WORDS = (
-    "BEKK(1,1): H_t = CC' + A r r'A + B H B with A and B multiples of the identity (scalar) or diagonal, fitted by "
-    "Gaussian likelihood; CCC and DCC as the engine fitted them, in two steps, so that their likelihood is not quite "
-    "the greatest. The 1σ of r_t is taken about zero, the mean of these models. A model weighs better than DCC where "
-    "the geometric mean is below 1 and its 1σ is less in at least three quarters of the windows."
+    "Δ: median of the windows, less that of DCC. BEKK(1,1): H_t = CC' + A r r'A + B H B with A and B multiples of the "
+    "identity (scalar) or diagonal, fitted by Gaussian likelihood; CCC and DCC as the engine fitted them, in two "
+    "steps, so that their likelihood is not quite the greatest. The 1σ of r_t is taken about zero, the mean of these "
+    "models. A model weighs better than DCC where the geometric mean is below 1 and its 1σ is less in at least three "
+    "quarters of the windows."
 )
 MOST_WINDOWS = 0.75
 

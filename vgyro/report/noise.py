@@ -180,7 +180,8 @@ def _curves(array: ArrayPart, table: Table, pick: Callable[[np.ndarray], Curve],
             picked = replace(pick(series == column), name=column, label=label, group=METHODS, visible=column in shown)
             ink = column == "average"
             curves.append(replace(picked, ink=ink, colour=0 if ink else index, width=2.4))
-    return curves
+    # Of some forty names those that are drawn come first.
+    return sorted(curves, key=lambda curve: (curve.group != GYROS, not curve.visible))
 
 
 def method_labels(array: ArrayPart) -> dict[str, str]:
