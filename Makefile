@@ -49,6 +49,9 @@ lint: $(READY)  ## formatting, style, types, layers, workflow
 
 papers: $(READY)  ## the tables of the two papers, regenerated
 	snakemake --cores $(CORES) papers
+	@echo
+	@echo "The papers' tables (simulated data):  $(CURDIR)/reports/papers/jiang2012.html"
+	@echo "                                      $(CURDIR)/reports/papers/liu2015.html"
 
 lock: $(READY)  ## resolve the dependencies again
 	uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --upgrade \
