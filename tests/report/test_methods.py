@@ -105,6 +105,7 @@ def test_a_recording_at_a_constant_rate_shows_its_own_figures(dataset: DatasetPa
     table["true_rate"] = np.full(len(table["true_rate"]), 30.0)
     turning = replace(array, kind="constant", tables={**array.tables, "metrics": table})
     assert turning.moved_values() == {}
+    assert moved_table(dataset, turning) == ""
     assert turning.added_rate == 0
     assert turning.values()["g1", ""]["sigma"].value == 0.05
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from vgyro.figure import Figure
 from vgyro.report.figure_cells import figure_cell
 from vgyro.report.html import join, paragraph
-from vgyro.report.model import ArrayPart, DatasetPart, Value, Values
+from vgyro.report.model import MOVED_KINDS, ArrayPart, DatasetPart, Value, Values
 from vgyro.report.numbers import plain
 from vgyro.report.tables import Cell, Column, Notes, Row, render_table
 
@@ -24,8 +24,13 @@ MOVED_RULE = (
 
 
 def moved_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
-    """Figures at rest and at the added rate side by side; methods for which nothing changes are named in one line."""
+    """Figures at rest and at the added rate side by side; methods for which nothing changes are named in one line.
+
+    Nothing for a recording that is not at rest: no rate was added to it.
+    """
     moved, still, rate = array.moved_values(), array.values(), array.added_rate
+    if array.kind not in MOVED_KINDS:
+        return Markup("")
     methods = [method for method in array.methods() if method["column"]]
     answering = [method for method in methods if _key(method) in moved]
     unchanged = _unchanged(method for method in methods if _key(method) not in moved)
