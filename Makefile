@@ -21,6 +21,7 @@ help:
 env: $(READY)  ## make or update the environment in .venv
 
 $(READY): $(LOCK) requirements/uv.txt pyproject.toml setup.py workflow/setup.sh $(NATIVE)
+	@echo "Making the environment in $(VENV): a minute or two, quietly"
 	@PYTHON=$(PYTHON) sh workflow/setup.sh $(VENV) requirements/uv.txt $(LOCK)
 	@touch $@
 
