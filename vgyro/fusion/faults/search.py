@@ -14,16 +14,19 @@ from vgyro.fusion.faults.bias import suspect_bias
 from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums, silent_share
 from vgyro.fusion.faults.candidate import Candidate
 from vgyro.fusion.faults.dead import find_dead
+from vgyro.fusion.faults.health import healthy_array
 from vgyro.fusion.faults.noise import NoiseLevel, mean_level, noise_level, ratio_of, suspect_noise
 from vgyro.fusion.faults.residuals import Residuals, Spoilt, common_ratio, residuals_of, usual_variance
 from vgyro.fusion.faults.scale import LEAST_CHANGE, slope_in, suspect_scale, usual_slope
-from vgyro.fusion.faults.wander import bends_of, healthy_array, local_variance, slow_part
+from vgyro.fusion.faults.wander import Slow, local_variance, slow_part
 from vgyro.fusion.faults.warmth import block_temperature, without_temperature
 
 FEWEST_GYROS = 3
 FEWEST_BLOCKS = 20
 LONGEST_GAP_S = 60.0
 MOST_ROUNDS = 100
+WORTH = 4.0
+"""Weaker evidence is not looked at a second time, against what the others do without that gyro."""
 MOST_COMMON = 2.0
 """Where the gyro in the middle of the array has more than this times its usual variance, no single one is judged."""
 NEAR = 8  # blocks: events of a kind that are nearer to each other are one
@@ -109,10 +112,11 @@ class _State:
 
     def __post_init__(self) -> None:
         self.judged, self.run = np.ones(len(self.sums), dtype=bool), self.sums.run
+        self.sigma2, self.gain = np.ones(self.sums.gyros), np.ones((len(self.sums), self.sums.gyros))
 
     def search(self) -> list[Candidate]:
-        sigma2 = usual_variance(self.sums)
-        gain = self._gain(sigma2)
+        self.sigma2 = sigma2 = usual_variance(self.sums)
+        self.gain = gain = self._gain(sigma2)
         self._judge(sigma2, gain)
         for _ in range(MOST_ROUNDS):
             found = residuals_of(self.sums, sigma2, gain, self._spoilt())
@@ -121,7 +125,7 @@ class _State:
                 break
             self.taken += accepted
             if any(one.kind == "scale" for one in accepted):
-                gain = self._gain(sigma2)
+                self.gain = gain = self._gain(sigma2)
         taken = [one for one in self.taken if one.kind != "scale" or abs(one.size) >= LEAST_CHANGE]
         return self._sized(taken, found)
 
@@ -214,24 +218,34 @@ class _State:
 
     def _other_suspects(self, found: Residuals) -> list[Candidate]:
         """The strongest suspicion of every gyro, of a step or drift and of a change of scale."""
-        threshold, run, gyros = self.options.threshold, self.run, range(self.sums.gyros)
-        counts = [self._counts(gyro, BIAS_KINDS) for gyro in gyros]
-        healthy = [self._counts(gyro, FAULT_KINDS) for gyro in gyros]
-        means = [without_temperature(found.mean[:, gyro], self.temperature, healthy[gyro], run) for gyro in gyros]
-        slow = [slow_part(found, gyro, counts[gyro], run, means[gyro]) for gyro in gyros]
-        bends = [bends_of(part, one) for part, one in zip(slow, healthy, strict=True)]
+        threshold, gyros = self.options.threshold, range(self.sums.gyros)
+        slow = [self._slow(found, gyro) for gyro in gyros]
+        health = healthy_array(slow)
         local = [local_variance(found, gyro) for gyro in gyros]
-        health = healthy_array(slow, bends)
         # What the motion is compared with is slow: noise of that sort is stronger than samples show if it has a colour.
-        shares = [np.median(part.white * self.sums.count / one) for part, one in zip(health, local, strict=True)]
+        shares = [np.median(part.white * self.sums.count / one) for part, one in zip(slow, local, strict=True)]
         colour = max(1.0, float(np.median(shares)))
         suspects = []
         for gyro, part in enumerate(health):
             steady = self._counts(gyro, ("scale",), BIAS_KINDS)
-            bias = suspect_bias(part, gyro, self.block_s, threshold)
-            suspects.append(bias if bias is not None and self._is_event(bias) else None)
+            biases = suspect_bias(part, gyro, self.block_s, min(WORTH, threshold))
+            if biases and biases[0].evidence < threshold:
+                others = self._without(gyro)
+                parts = [slow[one] if one == gyro else self._slow(others, one) for one in gyros]
+                biases = suspect_bias(healthy_array(parts)[gyro], gyro, self.block_s, threshold)
+            suspects.append(next((bias for bias in biases if self._is_event(bias)), None))
             suspects.append(suspect_scale(self.sums, found, gyro, steady, colour * local[gyro], threshold))
         return [one for one in suspects if one is not None]
+
+    def _slow(self, found: Residuals, gyro: int) -> Slow:
+        """Block means of a residual, what the temperature does to them taken off."""
+        healthy = self._counts(gyro, FAULT_KINDS)
+        mean = without_temperature(found.mean[:, gyro], self.temperature, healthy, self.run)
+        return slow_part(found, gyro, self._counts(gyro, BIAS_KINDS), self.run, mean)
+
+    def _without(self, gyro: int) -> Residuals:
+        """Residuals in which that gyro has no part: its fault is in those of all the others, and looks like wander."""
+        return residuals_of(self.sums, self.sigma2, self.gain, [*self._spoilt(), Spoilt(gyro, 0, len(self.sums))])
 
     def _is_event(self, one: Candidate) -> bool:
         """What would be off for all of a run has nothing left that it could be off from."""
