@@ -61,7 +61,7 @@ def test_a_rate_that_comes_and_goes():
         motion = smoother.choose_motion(z, R, still, RATE_HZ, models=["random_walk"])
         found = activity.find_activity(z, R, still, RATE_HZ, motion)
         level = (density == density.min()).astype(np.uint8)
-        known = Activity(level, np.array([density.max(), density.min()]) / motion.parameters["q"])
+        known = Activity(level, np.sqrt(np.array([density.max(), density.min()]) / motion.parameters["q"]), 1)
         runs = [smoother.smooth(z, R, still, RATE_HZ, motion, activity=one) for one in (found, known, None)]
         ours, oracle = (float(np.mean((run.rate - rate) ** 2)) for run in runs[:2])
         assert ours < 1.1 * oracle

@@ -55,17 +55,17 @@ def find_activity(
         return _errors(z, r, phi, found.rate, found.variance, counts, begins)
 
     cost = 2.0 * math.log(max(int(counts.sum()), 2))
-    base = STEP ** (2 * ORDER[motion.model])
-    known = {level: errors(Activity.even(len(z), base**level)) for level in range(-FIRST, FIRST + 1)}
+    order = ORDER[motion.model]
+    known = {level: errors(Activity.even(len(z), STEP**level, order)) for level in range(-FIRST, FIRST + 1)}
     path = _path(known, cost, apart)
     while more := _beyond(known, path):
-        known |= {level: errors(Activity.even(len(z), base**level)) for level in more}
+        known |= {level: errors(Activity.even(len(z), STEP**level, order)) for level in more}
         path = _path(known, cost, apart)
     levels, place = np.unique(path, return_inverse=True)
     if not levels.any():
         return None
     lengths = np.diff(begins, append=len(z))
-    activity = Activity(np.repeat(place.astype(np.uint8), lengths), base ** levels.astype(float))
+    activity = Activity(np.repeat(place.astype(np.uint8), lengths), STEP ** levels.astype(float), order)
     changes = int(np.count_nonzero(np.diff(path, prepend=0)))
     return activity if errors(activity).sum() + changes * cost < known[0].sum() else None
 

@@ -78,24 +78,31 @@ class Motion:
 class Activity:
     """How lively the rate is, beside its model.
 
-    level : [T] of uint8;  factor : [M], what the model's process noise is multiplied by at each level
+    level : [T] of uint8;  width : [M], what the bandwidth of the smoother is multiplied by at each level, about
+    order : the bandwidth goes with the 2·order-th root of the process noise
     """
 
     level: np.ndarray
-    factor: np.ndarray
+    width: np.ndarray
+    order: int
 
     @classmethod
-    def even(cls, samples: int, factor: float = 1.0) -> Activity:
+    def even(cls, samples: int, width: float = 1.0, order: int = 1) -> Activity:
         """The same throughout."""
-        return cls(np.zeros(samples, dtype=np.uint8), np.array([factor]))
+        return cls(np.zeros(samples, dtype=np.uint8), np.array([width]), order)
+
+    @property
+    def factor(self) -> np.ndarray:
+        """What the process noise is multiplied by at each level [M]."""
+        return self.width ** (2.0 * self.order)
 
     @property
     def text(self) -> str:
-        other = float(np.mean(self.factor[self.level] != 1.0))
-        used = self.factor[np.unique(self.level)]
+        other = float(np.mean(self.width[self.level] != 1.0))
+        used = self.width[np.unique(self.level)]
         if not other:
             return ""
-        return f"process noise × {used.min():.2g} to {used.max():.2g} in {100.0 * other:.0f} % of the time"
+        return f"{100.0 * other:.0f} % of the time with {used.min():.2g} to {used.max():.2g} times the bandwidth"
 
 
 @dataclass(frozen=True)
