@@ -5,7 +5,7 @@
 3. u = minimum-variance weights of R_t;  z = u'(y - b).
 4. The motion: model and parameters by likelihood, two-sided smoother of z with u'R_t·u (vgyro.fusion.smoother).
    Where the colours of the gyros' noise differ, R_t is scaled to the band that it passes (vgyro.fusion.parity_band).
-5. The sensor's low-pass, where parity shows its colour in the noise, is undone on the smoothed rate.
+5. The sensor's low-pass, where parity shows its colour in the noise of all gyros, is undone on the smoothed rate.
 
 The posterior variance of a sample is that of 4 plus that of u'(b - its estimate) of 2.
 """
@@ -39,7 +39,7 @@ def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
         weights,
         "; ".join(filter(None, [known.note, note])),
         known.slow.at_samples(slow_variance(weights, known.slow)),
-        undo_pole=True,
+        undo_pole=known.variances.all_coloured(shares),
     )
     return smoothed(array, parameters, signal)
 
