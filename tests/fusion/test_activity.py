@@ -213,7 +213,7 @@ def test_recommended_where_the_board_is_moved_now_and_then(monkeypatch):
 
 
 def test_a_colour_that_one_gyro_has_by_chance_is_no_pole():
-    # Truth: white noise and no pole. In this recording one gyro's noise seems correlated by 3 standard errors; taken for
+    # Truth: white noise and no pole. Here one gyro's noise seems correlated by 3 standard errors; taken for
     # a pole of 1.9 ms it made the error 0.04 deg/s, twice that of the smoother.
     array, rate = driven(2)
     moving = FilterParameters(in_motion=True)
