@@ -13,13 +13,13 @@ from vgyro.fusion.faults import find_faults, search_faults, sentence
 FOUND, ONSET_S = 0.95, 10.0
 DAY_S = 86400.0
 SAMPLE_S = 1.0 / RATE_HZ
-# Found of 200 (rest, motion), where 95 % are not reached. With the true flicker and random walk given, 59 of 60 (300 s)
-# and 60 of 60 (600 s) that grow to the end were found: 20 minutes tell a gyro's own wander too roughly.
-REACHED = {(150.0, True): "92.5 %, 92.0 %", (300.0, False): "82.5 %, 81.0 %", (300.0, True): "71.5 %, 70.0 %",
-           (600.0, False): "63.5 %, 67.5 %", (600.0, True): "57.0 %, 59.5 %"}  # fmt: skip
+# The slowest are near the bound, and are not measured with all 200 seeds: 22 of the 25 seeds 0-24 (stays, rest), 30 of
+# the 30 seeds 200-229 (grows, rest; stays, motion). Not strict until they are.
+NEAR_THE_BOUND = pytest.mark.xfail(strict=False, reason="found 88 % of seeds 0-24, 100 % of 200-229; 200 not measured")
 LASTING = [
-    pytest.param(*key, marks=pytest.mark.xfail(strict=True, reason=f"found {REACHED[key]}") if key in REACHED else ())
-    for key in ((length, grows) for length in (60.0, 150.0, 300.0, 600.0) for grows in (False, True))
+    pytest.param(length, grows, marks=NEAR_THE_BOUND if length == 600.0 else ())
+    for length in (60.0, 150.0, 300.0, 600.0)
+    for grows in (False, True)
 ]
 MOTIONS = [(kind, motion) for kind in KINDS for motion in (False, True) if motion or kind != "scale"]
 
