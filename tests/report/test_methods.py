@@ -135,6 +135,17 @@ def test_methods_stand_under_their_families(dataset: DatasetPart) -> None:
     assert methods[:3] == ["Recommended", "Average", "Median"]
 
 
+def test_forms_that_did_not_run_for_one_reason_share_a_row(dataset: DatasetPart) -> None:
+    array = array_of(dataset, "rest-x")
+    table = {name: np.array(values, dtype=object) for name, values in array.tables["methods"].items()}
+    causal = table["method"] == "dcc_causal"
+    table["column"][causal], table["note"][causal] = "", "no weights"
+    html = response_table(dataset, replace(array, tables={**array.tables, "methods": table}))
+    assert html.count("not run: no weights") == 1
+    assert html.count("DCC weights, causal<") == 1
+    assert "level, residual" in html
+
+
 def test_what_a_method_costs_and_needs_and_what_was_inferred(dataset: DatasetPart) -> None:
     html = response_table(dataset, array_of(dataset, "rest-x"))
     row = re.search(r">Jiang 2012, random walk<.*?</tr>", html, re.S).group(0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 from markupsafe import Markup
@@ -11,7 +12,7 @@ from markupsafe import Markup
 from vgyro.figure import Figure
 from vgyro.report.figure_cells import BAND_LIMITED, figure_cell, figure_column, says_limited
 from vgyro.report.html import join, paragraph
-from vgyro.report.model import ArrayPart, DatasetPart, Value, Values
+from vgyro.report.model import ArrayPart, DatasetPart, Record, Value, Values
 from vgyro.report.numbers import MISSING, count, significant
 from vgyro.report.tables import Cell, Column, Notes, Row, render_table
 
@@ -214,8 +215,15 @@ def _rows(
         mine = [method for method in methods if method["family"] == family]
         mine.sort(key=lambda method: FIRST.get(str(method["method"]), len(FIRST)))
         rows += [Row(heading=heading)] if mine else []
-        rows += [_method_row(method, of_method, width, notes) for method in mine]
+        rows += [_method_row(method, of_method, width, notes) for method in _together(mine)]
     return rows
+
+
+def _together(methods: Sequence[Record]) -> Iterator[Record]:
+    """The methods; the forms of one method that did not run, all for one reason, as one."""
+    for _, group in groupby(methods, key=lambda method: (method["column"], method["title"], method["note"])):
+        forms = list(group)
+        yield {**forms[0], "definition": ", ".join(form["definition"] for form in forms if form["definition"])}
 
 
 def _method_row(method: Mapping[str, Any], of_method: MakeCells, width: int, notes: Notes | None) -> Row:
