@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from vgyro.report.figure_cells import remarks
 from vgyro.report.numbers import duration, percent, plain, probability, significant, with_interval
 
 NAN = math.nan
@@ -40,3 +41,9 @@ def test_probabilities_and_lengths_of_time() -> None:
     assert probability(0.0523) == "0.052"
     assert [duration(value) for value in (20, 1200, 10_000)] == ["20.0 s", "20.0 min", "2.78 h"]
     assert plain(62.5) == "62.5"
+
+
+def test_a_footnote_leaves_out_how_such_a_figure_is_always_found():
+    assert remarks("gain 1.0003; the reference is no sinusoid") == "the reference is no sinusoid"
+    assert remarks("bootstrap of blocks of 5 s") == ""
+    assert remarks("") == ""

@@ -14,6 +14,7 @@ TAKES_PART = "the low-pass takes part"
 # Said of nearly every cell: a tooltip will do.
 ROUTINE = (
     "bootstrap of blocks",
+    "gain ",
     "each pose's own mean",
     "two-sided,",
     "line through",
@@ -28,6 +29,12 @@ ROUTINE = (
 )
 ROUTINE_END = ("degrees of freedom", " s.d.")
 NOT_GIVEN = {"nees": "the method gives no standard deviation of its rate"}
+
+
+def remarks(note: str) -> str:
+    """What a reader must know of a note: its clauses without those that say how such a figure is always found."""
+    clauses = note.split("; ")
+    return "; ".join(part for part in clauses if not (part.startswith(ROUTINE) or part.endswith(ROUTINE_END)))
 
 
 def figure_column(figure: Figure, group: str = "") -> Column:
@@ -58,14 +65,12 @@ def figure_cell(
     if value.note.startswith(NOT_SHOWN):
         return Cell(f"< {significant(value.high, 2)}", tone="muted", hint=value.note)
     insignificant = value.note.startswith(NOT_SIGNIFICANT)
-    clauses = value.note.split("; ")
-    routine = insignificant or all(clause.startswith(ROUTINE) or clause.endswith(ROUTINE_END) for clause in clauses)
     return number_cell(
         value.value,
         value.low,
         value.high,
         tone="muted" if insignificant else "best" if best else "",
-        notes=() if routine else notes.number(value.note),
+        notes=() if insignificant else notes.number(remarks(value.note)),
         hint=value.note,
         mark=BAND_LIMITED if limited or says_limited(value) else "",
     )

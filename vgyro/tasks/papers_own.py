@@ -10,6 +10,7 @@ from vgyro.papers.beside import Compared, Standing
 from vgyro.papers.compare import OWN
 from vgyro.papers.published import PublishedTable
 from vgyro.report import html, numbers, tables
+from vgyro.report.figure_cells import remarks
 
 TONES: dict[Standing, tables.Tone] = {
     "better": "good", "met": "good", "undecided": "warn", "worse": "bad", "missed": "bad", "none": "",
@@ -83,9 +84,10 @@ def _figure(one: Compared, least: bool, notes: tables.Notes) -> tables.Cell:
     if not one.value.known:
         return tables.Cell(numbers.MISSING, tone="muted", notes=notes.number(one.value.reason), hint=one.value.source)
     tone: tables.Tone = TONES[one.standing] if one.own and not one.over else "best" if least else ""
-    said = notes.number("; ".join(one.value.notes)) if one.own else ()
-    value = one.value
-    return tables.number_cell(value.value, value.low, value.high, tone=tone, notes=said, hint=value.source)
+    value, note = one.value, "; ".join(one.value.notes)
+    said = notes.number(remarks(note)) if one.own else ()
+    hint = "; ".join(filter(None, (value.source, note)))
+    return tables.number_cell(value.value, value.low, value.high, tone=tone, notes=said, hint=hint)
 
 
 def _ratio(one: Compared, notes: tables.Notes) -> tables.Cell:
