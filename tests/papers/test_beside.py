@@ -142,6 +142,13 @@ def test_the_part_of_the_page_counts_and_marks():
     assert own_methods(table(), ()) == ""
 
 
+def test_what_a_filter_does_by_its_shape_is_told():
+    rows = metrics()
+    rows[2]["note"] = "low-passed to 1 Hz; forward and back: by its shape alone it passes 0.88"
+    text = str(own_methods(table(), set_beside(table(), Evidence({"metrics": rows}))))
+    assert "<li>forward and back: by its shape alone it passes 0.88</li>" in text
+
+
 @pytest.mark.parametrize("name", PAPERS)
 def test_every_table_of_virtual_gyroscopes_has_ours_beside_it(name):
     beside = {part.number: part.beside for part in load_paper(name).tables if part.beside}

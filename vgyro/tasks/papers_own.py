@@ -10,7 +10,7 @@ from vgyro.papers.beside import Compared, Standing
 from vgyro.papers.compare import OWN
 from vgyro.papers.published import PublishedTable
 from vgyro.report import html, numbers, tables
-from vgyro.report.figure_cells import remarks
+from vgyro.report.figure_cells import BAND_LIMITED, remarks
 
 TONES: dict[Standing, tables.Tone] = {
     "better": "good", "met": "good", "undecided": "warn", "worse": "bad", "missed": "bad", "none": "",
@@ -18,6 +18,8 @@ TONES: dict[Standing, tables.Tone] = {
 COUNTED: dict[Standing, str] = {
     "better": "better", "undecided": "undecided (the interval holds 1)", "worse": "worse",
 }  # fmt: skip
+# What a low-pass does by itself is no merit of the method.
+TOLD = ("forward and back", BAND_LIMITED)
 TARGETS: dict[Standing, str] = {"met": "met", "undecided": "undecided", "missed": "missed"}
 LEGEND = (
     "Simulated, on the same recordings as above. The ratio is to the method of the paper with the least of that figure "
@@ -85,7 +87,8 @@ def _figure(one: Compared, least: bool, notes: tables.Notes) -> tables.Cell:
         return tables.Cell(numbers.MISSING, tone="muted", notes=notes.number(one.value.reason), hint=one.value.source)
     tone: tables.Tone = TONES[one.standing] if one.own and not one.over else "best" if least else ""
     value, note = one.value, "; ".join(one.value.notes)
-    said = notes.number(remarks(note)) if one.own else ()
+    told = "; ".join(part for part in note.split("; ") if remarks(part) or part.startswith(TOLD))
+    said = notes.number(told) if one.own else ()
     hint = "; ".join(filter(None, (value.source, note)))
     return tables.number_cell(value.value, value.low, value.high, tone=tone, notes=said, hint=hint)
 
