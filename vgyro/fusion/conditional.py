@@ -31,7 +31,9 @@ def conditional(model: str, mode: str) -> Callable[[ArrayRates, FilterParameters
     def fuse(array: ArrayRates, parameters: FilterParameters) -> Fused:
         key = (model, mode, parameters.definition)
         if key not in array.weights:
-            none = f"there are no {mode} weights of {model.upper()} for this definition of r_t"
+            none = f"the volatility stage made no {mode} weights of {model.upper()} for this definition of r_t"
+            if parameters.in_motion:
+                none = "the volatility of a recording in motion is not analysed"
             raise CannotRun(array.no_weights.get(key, none))
         weights = array.weights[key]
         shape = (len(weights.block), weights.gyros)

@@ -13,11 +13,10 @@ from vgyro.fusion.faults.wander import Slow
 SIDE = 1.5  # of the window, on each side, is fitted
 BINS = 192
 KNOTS = 48
-POINTS = 96
+POINTS, EVERY = 96, 2
+"""Points of the fit that knows of the wander, and between the knots that are tried first."""
 NEAR_POINTS = 16
-EVERY = 2
 LEAST_POWER, UNKNOWN_TIMES = 1e-9, 1e9
-"""Points, and between the knots that are tried first, of the fit that knows of the wander."""
 
 
 @dataclass(frozen=True)
