@@ -32,12 +32,14 @@ localrules:
 
 rule all:
     input:
+        everything,
         "reports/index.html",
         "results/verdict.json",
 
 
 rule papers:
     input:
+        everything_of_papers,
         expand("reports/papers/{paper}.html", paper=PAPERS),
 
 

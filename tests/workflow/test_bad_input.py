@@ -76,3 +76,29 @@ def test_a_wrong_config_stops_everything(lab) -> None:
     assert done.returncode != 0
     assert "config/config.yaml:1: analysis.volatility.widow: unknown key; did you mean 'window'?" in done.stdout
     shutil.rmtree(lab.folder / "raw/wrong")
+
+
+@pytest.mark.usefixtures("output")
+def test_the_run_after_one_that_failed_makes_what_is_missing(lab) -> None:
+    # A stage that fails half-way leaves the page of the run before. Truth: the next run must not take it for today's.
+    for bad in ("empty", "other", "cut", "missing", "wrong"):
+        shutil.rmtree(lab.folder / "raw" / bad, ignore_errors=True)
+    assert lab.run("--cores", "2").returncode == 0
+    page, fused = lab.folder / "reports/tiny.html", lab.folder / "results/tiny/static/z/fused.parquet"
+    before, stage, config = page.read_bytes(), lab.folder / "vgyro/tasks/fuse.py", lab.folder / "config/config.yaml"
+    kept, options = stage.read_text(encoding="utf-8"), config.read_text(encoding="utf-8")
+    config.write_text("analysis: {fusion: {bandwidth_hz: 3.3}}\n", encoding="utf-8")
+    stage.write_text(kept.replace("def main(", "raise SystemExit('no power')\n\n\ndef main("), encoding="utf-8")
+    failed = lab.run("--cores", "2")
+    stage.write_text(kept, encoding="utf-8")
+    assert failed.returncode != 0
+    assert not fused.exists()
+    assert page.read_bytes() == before
+    overview = (lab.folder / "reports/index.html").read_text(encoding="utf-8")
+    assert "tiny: a job failed or did not run, so its page is that of an earlier run" in overview
+    again = lab.run("--cores", "2")
+    config.write_text(options, encoding="utf-8")
+    assert again.returncode == 0, again.stdout
+    assert fused.exists()
+    assert page.read_bytes() != before
+    assert "an earlier run" not in (lab.folder / "reports/index.html").read_text(encoding="utf-8")

@@ -42,7 +42,7 @@ def render_index(
     if headlines:
         table = render_table(COLUMNS, [_row(record) for record in headlines])
         parts.append(Section("datasets", "Data sets", table))
-    else:
+    elif not problems:
         words = "No data set yet: put a dataset.yaml and its files into raw/<name>/ and run snakemake again."
         parts.append(Section("datasets", "Data sets", paragraph(words)))
     if papers:

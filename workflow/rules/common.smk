@@ -4,7 +4,9 @@ import json
 import math
 import shlex
 import sys
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 from vgyro.config import override_analysis
 from vgyro.dataset import AT_REST
@@ -15,6 +17,7 @@ from vgyro.tasks.inputs_check import reference_file as logged_reference
 from vgyro.tasks.twins import load_twins
 
 PAPERS = ("jiang2012", "liu2015")
+STARTED = time.time()
 
 # One thread a job: Snakemake places the jobs on the cores, and one thread gives the same bytes everywhere.
 shell.prefix(
@@ -194,7 +197,7 @@ def weights_of(wildcards):
 def injected_rate(wildcards):
     """Constant rate that the job adds to every gyro, deg/s; None: none is added."""
     added = analysis_of(wildcards.dataset).metrics.injected_rate
-    moved = wildcards.get("definition", "moved") == "moved"
+    moved = getattr(wildcards, "definition", "moved") == "moved"
     at_rest = kind_of(wildcards.dataset, wildcards.recording) in AT_REST
     return added if moved and at_rest else None
 
@@ -339,8 +342,60 @@ def artefacts_of(wildcards):
     return paths
 
 
+def artefacts_before(dataset):
+    """Every artefact of a data set that others are made from, and that no page shows."""
+    paths = [f"results/{dataset}/{name}.json" for name in ("calibration", "screen")]
+    paths += all_integrity(SimpleNamespace(dataset=dataset))
+    paths += all_noise(SimpleNamespace(dataset=dataset))
+    for recording in usable(dataset):
+        for axis in DATASETS[dataset].board.axes:
+            job = SimpleNamespace(dataset=dataset, recording=recording, axis=axis)
+            paths += series_of(job) + moved_weights_of(job)
+    return paths
+
+
+def everything_of(datasets):
+    """Every artefact of some data sets, so that each is asked for by itself.
+
+    What is missing half-way to a page that exists is not made again by Snakemake: the page of yesterday would hide the
+    job that failed today.
+    """
+    found = []
+    for name in datasets:
+        found += artefacts_before(name)
+        found += artefacts_of(SimpleNamespace(dataset=name))
+    return found
+
+
+def everything(wildcards):
+    """Every artefact and page of all data sets in raw/."""
+    made = [f"reports/{name}.html" for name in LOADED.datasets]
+    made += [f"results/{name}/headline.json" for name in LOADED.datasets]
+    return made + everything_of(LOADED.datasets)
+
+
+def everything_of_papers(wildcards):
+    """Every artefact of the papers' twins."""
+    return everything_of(PAPERS)
+
+
+def unfinished():
+    """What the overview says of data sets whose page was not made in a run that failed."""
+    texts = []
+    for name in LOADED.datasets:
+        page = Path(f"reports/{name}.html")
+        logs = Path("results/logs", name).rglob("*.log")
+        worked_on = any(log.stat().st_mtime > STARTED for log in logs)
+        if page.exists() and (page.stat().st_mtime > STARTED or not worked_on):
+            continue
+        state = "its page is that of an earlier run" if page.exists() else "no page"
+        remedy = f"read results/logs/{name}/, then run snakemake again"
+        texts.append(f"{name}: a job failed or did not run, so {state}; {remedy}")
+    return texts
+
+
 def index_command():
-    """Command that writes the overview from the headlines that exist."""
+    """Command that writes the overview of a run that failed, from the headlines that exist."""
     headlines = [f"results/{name}/headline.json" for name in LOADED.datasets]
     there = [path for path in headlines if Path(path).exists()]
     return " ".join(
@@ -351,7 +406,7 @@ def index_command():
         ]
         + [
             "--options",
-            shlex.quote(json.dumps({"problems": PROBLEMS})),
+            shlex.quote(json.dumps({"problems": PROBLEMS + unfinished()})),
             "--log results/logs/index.log",
         ]
     )
