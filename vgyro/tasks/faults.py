@@ -37,7 +37,7 @@ HALF_A_COUNT = 0.5
 
 
 def main(task: Task) -> None:
-    """inputs : rates, calibration;  outputs : faults;  options : board, axis, analysis.faults
+    """inputs : rates, calibration;  outputs : faults;  options : board, axis, kind, analysis.faults
 
     A recording in which nothing could be looked for, or not every kind, has the reason as a note in the metadata.
     """
@@ -51,7 +51,7 @@ def main(task: Task) -> None:
         file = read_array(task.input("rates"), names, task.options["axis"])
         array = array_of(file, read_temperature(file, thermometers(board, names)))
         zero = zero_counts(file.path, gyros, task.inputs.get("calibration", []))
-        search = search_faults(array, options, zero)
+        search = search_faults(array, options, zero, in_hand=task.options["kind"] == "free")
         note, events = search.note, search.events
         times = times_at(file.path, [sample for one in events for sample in (one.start, one.stop - 1)])
         ends = [one.stop == len(array.rate) for one in events]

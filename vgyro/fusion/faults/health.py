@@ -100,7 +100,7 @@ def changes_of_level(points: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array([form for sort in sorts for form in sort]).T, log_prior
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _grid(points: int, profile: tuple[int, ...]) -> Grid:
     """profile : [n] powers of four, the variance of the white part of each point over its usual one."""
     white = np.diag(4.0 ** np.array(profile, dtype=float))
@@ -115,7 +115,9 @@ def _grid(points: int, profile: tuple[int, ...]) -> Grid:
     diagonal = np.diagonal(factor, axis1=1, axis2=2)
     log_norm = 2.0 * np.log(diagonal).sum(axis=1) + np.log(total)
     changes, log_prior = changes_of_level(points)
-    power = np.maximum(((inverse @ changes) * changes).sum(axis=1), 1e-12)
+    # Single precision: most of the work is here, and a prior is added to it.
+    short = changes.astype(np.float32)
+    power = np.maximum(((inverse.astype(np.float32) @ short) * short).sum(axis=1, dtype=float), 1e-12)
     return Grid(inverse, log_norm, changes, log_prior, power)
 
 

@@ -84,10 +84,12 @@ def common_ratio(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray) -> np.nd
     return np.median(of_each, axis=1)
 
 
-def residuals_of(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray, spoilt: Sequence[Spoilt]) -> Residuals:
+def residuals_of(
+    sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray, spoilt: Sequence[Spoilt], run: np.ndarray | None = None
+) -> Residuals:
     """Residuals of every gyro against the inverse-variance combination of the others that are not spoilt.
 
-    gain : [B, N] sensitivity of each gyro, by which its rates are divided
+    gain : [B, N] sensitivity of each gyro, by which its rates are divided;  run [B] : as of the sums; None: theirs
     A spoilt gyro is not just left out of the means: its bias would go with it, and the others would seem to jump. Its
     mean is filled in so that its difference from the others goes straight from before to after.
     """
@@ -96,7 +98,7 @@ def residuals_of(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray, spoilt: 
     for one in spoilt:
         weight[one.first : one.last, one.gyro] = 0.0
     rate = (sums.mean[:, :gyros] + sums.mean[:, gyros:]) / gain
-    filled = _filled(rate, 1.0 / sigma2, spoilt)
+    filled = _filled(rate, 1.0 / sigma2, spoilt, sums.run if run is None else run)
     total = weight.sum(axis=1)
     everyone = 1.0 / sigma2
     shape = (blocks, gyros)
@@ -126,16 +128,17 @@ def residuals_of(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray, spoilt: 
     return Residuals(mean, variance, expected, motion, energy, product, others, sigma2, moving)
 
 
-def _filled(rate: np.ndarray, weight: np.ndarray, spoilt: Sequence[Spoilt]) -> np.ndarray:
-    """Means of the gyros [B, N] with spoilt ones replaced."""
+def _filled(rate: np.ndarray, weight: np.ndarray, spoilt: Sequence[Spoilt], run: np.ndarray) -> np.ndarray:
+    """Means of the gyros [B, N] with spoilt ones replaced, from their own runs [B]: in others biases may be others."""
     if not spoilt:
         return rate
-    filled, blocks = rate.copy(), len(rate)
+    filled = rate.copy()
     bad = np.zeros(rate.shape, dtype=bool)
     for one in spoilt:
         bad[one.first : one.last, one.gyro] = True
     for first, last, gyro in _joined(spoilt):
-        low, high = max(0, first - LEVEL_BLOCKS), min(blocks, last + LEVEL_BLOCKS)
+        low = max(int(np.searchsorted(run, run[first])), first - LEVEL_BLOCKS)
+        high = min(int(np.searchsorted(run, run[last - 1], side="right")), last + LEVEL_BLOCKS)
         share = _good_share(bad, weight, gyro, ((low, high), (first, last)))
         own = np.where(bad[:, gyro], np.nan, rate[:, gyro] - rate @ share)
         begin, end = _level(own[low:first]), _level(own[last:high])

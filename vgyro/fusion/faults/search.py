@@ -33,6 +33,10 @@ NEAR = 8  # blocks: events of a kind that are nearer to each other are one
 ONLY_DEAD = "only stuck and dropout were looked for"
 TOO_FEW = f"fewer than three gyros: a difference does not tell which of two is at fault; {ONLY_DEAD}"
 TOO_SHORT = f"less than {FEWEST_BLOCKS} blocks; {ONLY_DEAD}"
+IN_HAND = (
+    "in motion only stuck and dropout were looked for: between two rests of a free recording the board may be turned "
+    "over, and its gyros are neither quite parallel nor blind to gravity"
+)
 LEAST_HEALTHY = 0.05
 COMMON_ERRORS = 6.0
 MOST_SILENT = 0.02
@@ -63,10 +67,13 @@ def find_faults(
     return search_faults(array, options, zero).events
 
 
-def search_faults(array: ArrayRates, options: FaultOptions | None = None, zero: np.ndarray | None = None) -> Search:
+def search_faults(
+    array: ArrayRates, options: FaultOptions | None = None, zero: np.ndarray | None = None, in_hand: bool = False
+) -> Search:
     """Look for stretches in which a gyro is at fault.
 
     zero : [N, 2] deg/s, between which the rate of a count of zero lies (NaN: not known), to tell dropout from stuck
+    in_hand : the board may be turned over between its rests: only these are judged, and each has biases of its own
     Parity: each gyro against the inverse-variance combination of the others, so that the motion cancels. The strongest
     suspicion is taken (for a single fault that is the likelihood's choice), its gyro left out of the combination there,
     and the search begun again, so that it accuses no other. Evidence is in standard deviations of what this recording
@@ -84,11 +91,15 @@ def search_faults(array: ArrayRates, options: FaultOptions | None = None, zero: 
     sums = block_sums(array, length, stretches, LONGEST_GAP_S)
     if np.median(silent_share(sums)) > MOST_SILENT:
         return Search(dead, TOO_COARSE)
+    still, note = None, ""
+    if in_hand and array.at_rest.any() and not array.at_rest.all():
+        still, note = np.logical_and.reduceat(array.at_rest, sums.edges[:-1]), IN_HAND
     state = _State(
-        sums, length * array.period, options, _spoilt_by(dead, sums), block_temperature(array.temperature, sums.edges)
-    )
+        sums, length * array.period, options, _spoilt_by(dead, sums),
+        block_temperature(array.temperature, sums.edges), still,
+    )  # fmt: skip
     found = [_in_samples(one, sums) for one in _merged(state.search(), options.burst_s / state.block_s)]
-    return Search(sorted([*dead, *found], key=lambda event: (event.start, event.gyro, event.kind)))
+    return Search(sorted([*dead, *found], key=lambda event: (event.start, event.gyro, event.kind)), note)
 
 
 def _spoilt_by(dead: Sequence[FaultEvent], sums: BlockSums) -> list[Spoilt]:
@@ -108,6 +119,7 @@ class _State:
     options: FaultOptions
     dead: list[Spoilt]
     temperature: np.ndarray | None = None
+    still: np.ndarray | None = None
     taken: list[Candidate] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -119,7 +131,7 @@ class _State:
         self.gain = gain = self._gain(sigma2)
         self._judge(sigma2, gain)
         for _ in range(MOST_ROUNDS):
-            found = residuals_of(self.sums, sigma2, gain, self._spoilt())
+            found = residuals_of(self.sums, sigma2, gain, self._spoilt(), self.run)
             accepted = self._strongest(found)
             if not accepted:
                 break
@@ -133,7 +145,8 @@ class _State:
         """Leave out the blocks in motion in which most gyros leave the others at once: that is the array, not a gyro.
 
         Gyros that are not parallel see different parts of a hard motion, and where the board comes to rest again their
-        biases may be others, as gravity has another direction. So a run ends there, too.
+        biases may be others, as gravity has another direction. So a run ends there, too. still [B] : only these blocks
+        are judged, and each stretch of them is a run.
         """
         moving = residuals_of(self.sums, sigma2, gain, self.dead).moving
         # A variance of few samples is several times its mean by chance.
@@ -145,6 +158,9 @@ class _State:
         run = self.sums.run.copy()
         for place in begins:
             run[place:] += 1
+        if self.still is not None:
+            self.judged &= self.still
+            run += np.cumsum(np.diff(self.still, prepend=self.still[:1]))
         self.run = run
 
     def _gain(self, sigma2: np.ndarray) -> np.ndarray:
@@ -154,12 +170,12 @@ class _State:
         """
         gyros, spoilt = self.sums.gyros, self._spoilt()
         gain = np.ones((len(self.sums), gyros))
-        found = residuals_of(self.sums, sigma2, gain, spoilt)
+        found = residuals_of(self.sums, sigma2, gain, spoilt, self.run)
         usual = [1.0 + usual_slope(self.sums, found, gyro, self._counts(gyro, ("scale",))) for gyro in range(gyros)]
         gain *= np.array(usual) / np.median(usual)
         if all(one.kind != "scale" for one in self.taken):
             return gain
-        found = residuals_of(self.sums, sigma2, gain, spoilt)
+        found = residuals_of(self.sums, sigma2, gain, spoilt, self.run)
         for index, one in enumerate(self.taken):
             if one.kind == "scale":
                 size = slope_in(self.sums, found, one.gyro, one.first, one.last)
@@ -245,7 +261,8 @@ class _State:
 
     def _without(self, gyro: int) -> Residuals:
         """Residuals in which that gyro has no part: its fault is in those of all the others, and looks like wander."""
-        return residuals_of(self.sums, self.sigma2, self.gain, [*self._spoilt(), Spoilt(gyro, 0, len(self.sums))])
+        spoilt = [*self._spoilt(), Spoilt(gyro, 0, len(self.sums))]
+        return residuals_of(self.sums, self.sigma2, self.gain, spoilt, self.run)
 
     def _is_event(self, one: Candidate) -> bool:
         """What would be off for all of a run has nothing left that it could be off from."""
