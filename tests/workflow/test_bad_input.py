@@ -80,25 +80,49 @@ def test_a_wrong_config_stops_everything(lab) -> None:
 
 @pytest.mark.usefixtures("output")
 def test_the_run_after_one_that_failed_makes_what_is_missing(lab) -> None:
-    # A stage that fails half-way leaves the page of the run before. Truth: the next run must not take it for today's.
+    # A stage that fails half-way leaves an overview, and no page or that of the run before. Truth: the next run must
+    # not take these for its own.
     for bad in ("empty", "other", "cut", "missing", "wrong"):
         shutil.rmtree(lab.folder / "raw" / bad, ignore_errors=True)
-    assert lab.run("--cores", "2").returncode == 0
-    page, fused = lab.folder / "reports/tiny.html", lab.folder / "results/tiny/static/z/fused.parquet"
-    before, stage, config = page.read_bytes(), lab.folder / "vgyro/tasks/fuse.py", lab.folder / "config/config.yaml"
-    kept, options = stage.read_text(encoding="utf-8"), config.read_text(encoding="utf-8")
+    for made in ("results", "reports", ".snakemake"):
+        shutil.rmtree(lab.folder / made)
+    page, overview = lab.folder / "reports/tiny.html", lab.folder / "reports/index.html"
+    assert broken_run(lab).returncode != 0
+    assert not page.exists()
+    assert "tiny: a job failed or did not run, so no page" in overview.read_text(encoding="utf-8")
+    again = lab.run("--cores", "2")
+    assert again.returncode == 0, again.stdout
+    before = page.read_bytes()
+    config = lab.folder / "config/config.yaml"
+    options = config.read_text(encoding="utf-8")
     config.write_text("analysis: {fusion: {bandwidth_hz: 3.3}}\n", encoding="utf-8")
-    stage.write_text(kept.replace("def main(", "raise SystemExit('no power')\n\n\ndef main("), encoding="utf-8")
-    failed = lab.run("--cores", "2")
-    stage.write_text(kept, encoding="utf-8")
-    assert failed.returncode != 0
-    assert not fused.exists()
+    assert broken_run(lab).returncode != 0
     assert page.read_bytes() == before
-    overview = (lab.folder / "reports/index.html").read_text(encoding="utf-8")
-    assert "tiny: a job failed or did not run, so its page is that of an earlier run" in overview
+    assert "tiny: a job failed or did not run, so its page is that of an earlier run" in overview.read_text("utf-8")
     again = lab.run("--cores", "2")
     config.write_text(options, encoding="utf-8")
     assert again.returncode == 0, again.stdout
-    assert fused.exists()
     assert page.read_bytes() != before
-    assert "an earlier run" not in (lab.folder / "reports/index.html").read_text(encoding="utf-8")
+    assert "an earlier run" not in overview.read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("output")
+def test_what_is_missing_half_way_to_a_page_is_made_again(lab) -> None:
+    # Truth: what a failed job has left is a page, and no file that its figures are from.
+    for bad in ("empty", "other", "cut", "missing", "wrong"):
+        shutil.rmtree(lab.folder / "raw" / bad, ignore_errors=True)
+    assert lab.run("--cores", "2").returncode == 0
+    fused = lab.folder / "results/tiny/static/z/fused.parquet"
+    fused.unlink()
+    assert lab.run("--cores", "2").returncode == 0
+    assert fused.exists()
+
+
+def broken_run(lab):
+    """A run in which the fuse stage fails."""
+    stage = lab.folder / "vgyro/tasks/fuse.py"
+    kept = stage.read_text(encoding="utf-8")
+    stage.write_text(kept.replace("def main(", "raise SystemExit('no power')\n\n\ndef main("), encoding="utf-8")
+    done = lab.run("--cores", "2")
+    stage.write_text(kept, encoding="utf-8")
+    return done
