@@ -147,10 +147,8 @@ def notes(board: Board, ledger: Ledger, still: int) -> list[str]:
                 "without counter and time stamp, gaps are as long as the damaged bytes; whole pauses do not show"
             )
         else:
-            gaps = "1 gap is the shortest that fits" if ledger.ambiguous == 1 else (
-                f"{ledger.ambiguous} gaps are the shortest that fit"
-            )  # fmt: skip
-            found.append(f"{gaps}; {what} more would fit as well")
+            gaps = "gap is the shortest that fits" if ledger.ambiguous == 1 else "gaps are the shortest that fit"
+            found.append(f"{ledger.ambiguous} {gaps}; {what} more would fit as well")
     if still:
         found.append(f"the counter stood still in {still} frames")
     if board.frame is not None and board.frame.checksum.family == "none":

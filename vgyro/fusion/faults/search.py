@@ -127,31 +127,31 @@ class _State:
         self.sigma2, self.gain = np.ones(self.sums.gyros), np.ones((len(self.sums), self.sums.gyros))
 
     def search(self) -> list[Candidate]:
-        self.sigma2 = sigma2 = usual_variance(self.sums)
-        self.gain = gain = self._gain(sigma2)
-        self._judge(sigma2, gain)
+        self.sigma2 = usual_variance(self.sums)
+        self.gain = self._gain()
+        self._judge()
         for _ in range(MOST_ROUNDS):
-            found = residuals_of(self.sums, sigma2, gain, self._spoilt(), self.run)
+            found = self._residuals(self._spoilt())
             accepted = self._strongest(found)
             if not accepted:
                 break
             self.taken += accepted
             if any(one.kind == "scale" for one in accepted):
-                self.gain = gain = self._gain(sigma2)
+                self.gain = self._gain()
         taken = [one for one in self.taken if one.kind != "scale" or abs(one.size) >= LEAST_CHANGE]
         return self._sized(taken, found)
 
-    def _judge(self, sigma2: np.ndarray, gain: np.ndarray) -> None:
+    def _judge(self) -> None:
         """Leave out the blocks in motion in which most gyros leave the others at once: that is the array, not a gyro.
 
         Gyros that are not parallel see different parts of a hard motion, and where the board comes to rest again their
         biases may be others, as gravity has another direction. So a run ends there, too. still [B] : only these blocks
         are judged, and each stretch of them is a run.
         """
-        moving = residuals_of(self.sums, sigma2, gain, self.dead).moving
+        moving = self._residuals(self.dead).moving
         # A variance of few samples is several times its mean by chance.
         most = np.maximum(MOST_COMMON, 1.0 + COMMON_ERRORS * np.sqrt(2.0 / self.sums.count))
-        apart = moving & (common_ratio(self.sums, sigma2, np.median(gain, axis=0)) > most)
+        apart = moving & (common_ratio(self.sums, self.sigma2, np.median(self.gain, axis=0)) > most)
         self.judged = ~(apart | np.append(apart[1:], False) | np.append(False, apart[:-1]))
         hard = apart & (np.append(apart[1:], False) | np.append(False, apart[:-1]))
         begins = np.flatnonzero(np.diff(np.append(False, hard).astype(np.int8)) != 0)
@@ -163,19 +163,19 @@ class _State:
             run += np.cumsum(np.diff(self.still, prepend=self.still[:1]))
         self.run = run
 
-    def _gain(self, sigma2: np.ndarray) -> np.ndarray:
+    def _gain(self) -> np.ndarray:
         """Sensitivity of each gyro relative to the others [B, N]: constant but for changes that were found.
 
         What is known of the sizes of these changes is brought up to date. 1 without motion.
         """
         gyros, spoilt = self.sums.gyros, self._spoilt()
         gain = np.ones((len(self.sums), gyros))
-        found = residuals_of(self.sums, sigma2, gain, spoilt, self.run)
+        found = residuals_of(self.sums, self.sigma2, gain, spoilt, self.run)
         usual = [1.0 + usual_slope(self.sums, found, gyro, self._counts(gyro, ("scale",))) for gyro in range(gyros)]
         gain *= np.array(usual) / np.median(usual)
         if all(one.kind != "scale" for one in self.taken):
             return gain
-        found = residuals_of(self.sums, sigma2, gain, spoilt, self.run)
+        found = residuals_of(self.sums, self.sigma2, gain, spoilt, self.run)
         for index, one in enumerate(self.taken):
             if one.kind == "scale":
                 size = slope_in(self.sums, found, one.gyro, one.first, one.last)
@@ -261,7 +261,10 @@ class _State:
 
     def _without(self, gyro: int) -> Residuals:
         """Residuals in which that gyro has no part: its fault is in those of all the others, and looks like wander."""
-        spoilt = [*self._spoilt(), Spoilt(gyro, 0, len(self.sums))]
+        return self._residuals([*self._spoilt(), Spoilt(gyro, 0, len(self.sums))])
+
+    def _residuals(self, spoilt: Sequence[Spoilt]) -> Residuals:
+        """Residuals with what is known so far of usual variances, sensitivities and runs."""
         return residuals_of(self.sums, self.sigma2, self.gain, spoilt, self.run)
 
     def _is_event(self, one: Candidate) -> bool:
