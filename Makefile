@@ -56,7 +56,7 @@ papers: $(READY)  ## the tables of the two papers, regenerated
 
 lock: $(READY)  ## resolve the dependencies again
 	uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --upgrade \
-	    --extra dev pyproject.toml -o $(LOCK)
+	    --extra dev --extra logs pyproject.toml -o $(LOCK)
 	sed -n '/^uv==/,/^[^ ]/p' $(LOCK) | sed '$$d' > requirements/uv.txt
 
 clean:  ## remove the environment and everything that was computed; raw/ stays
