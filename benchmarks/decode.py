@@ -70,7 +70,7 @@ def contests(quick: bool) -> list[Contest]:
 
 
 def _reader(path: Path, board: Board) -> DumpReader:
-    return DumpReader([path], board, board.rate_hz, IntegrityOptions(), boards=BOARDS)
+    return DumpReader([path], board, board.frame_rate_hz, IntegrityOptions(), boards=BOARDS)
 
 
 def _channels(board: Board) -> list[str]:

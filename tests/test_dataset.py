@@ -87,7 +87,7 @@ def test_every_disagreement_with_the_board_is_named():
     text = """\
 - {name: a, kind: free, files: x, axis: x}
 - {name: b, kind: constant, files: x, reference: {kind: constant, rate: 1}}
-- {name: c, kind: free, files: x, parquet: {columns: {g9: rate}}}
+- {name: c, kind: free, files: x, log: {columns: {g9: rate}}}
 - {name: d, kind: constant, files: x, axis: y, reference: {kind: constant, rate: 1}}
 """
     found = check_against_board(manifest(text, "gyros: [g1, g3, gg2]\n"), BOARD, "f")
@@ -95,7 +95,7 @@ def test_every_disagreement_with_the_board_is_named():
         ("gyros.2", "board 'test' has no gyro 'gg2'; did you mean 'g2'?"),
         ("recordings.0.axis", "expected one of z, y; found 'x'"),
         ("recordings.1.axis", "missing; the reference turns about one of z, y"),
-        ("recordings.2.parquet.columns.g9", "board 'test' has no channel 'g9'; known: g1, g2, g3, t"),
+        ("recordings.2.log.columns.g9", "board 'test' has no channel 'g9'; known: g1, g2, g3, t"),
     ]
 
 

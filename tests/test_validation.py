@@ -61,12 +61,12 @@ def test_missing_keys_are_named_at_the_line_of_what_lacks_them():
         ("rest: [[0, 10], [20]]", "rest.1: item 2 is missing"),
         ("rest: [[0, 10], [20, soon]]", "rest.1.1: expected a number, found 'soon'"),
         ("rest: [[0, 10, 20]]", "rest.0: expected at most 2 items, found 3"),
-        ("parquet: {values: count}",
+        ("log: {values: count}",
          "parquet.values: expected one of counts, rates; found 'count'; did you mean 'counts'?"),
-        ("parquet: {columns: {g1: 1}}", "parquet.columns.g1: expected text, found 1; put it in quotes"),
-        ("parquet: log", "parquet: expected keys and values, found 'log'"),
-        ("parquet: {colums: {}}", "parquet.colums: unknown key; did you mean 'columns'?"),
-        ("parquet: {xyz: 1}", "parquet.xyz: unknown key; known: columns, values, time"),
+        ("log: {columns: {g1: 1}}", "log.columns.g1: expected text, found 1; put it in quotes"),
+        ("log: log", "log: expected keys and values, found 'log'"),
+        ("log: {colums: {}}", "log.colums: unknown key; did you mean 'columns'?"),
+        ("log: {xyz: 1}", "log.xyz: unknown key; known: columns, values, time"),
     ],
 )  # fmt: skip
 def test_one_mistake_makes_one_message(line, expected):

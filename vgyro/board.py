@@ -175,10 +175,12 @@ class Board(StrictModel):
     name: str = Field(description="the file's name without .yaml")
     title: str = Field(description="heading in reports")
     source: str = Field("", description="document that gives the layout and the scaling")
-    rate_hz: float = Field(gt=0, description="frames a second, unless a recording says otherwise")
+    rate_hz: float | None = Field(
+        None, gt=0, description="frames a second, unless a recording says otherwise; null: a log's stamps tell"
+    )
     baud: int | None = Field(None, gt=0, description="of the serial line, for information")
     frame: Annotated[BinaryFrame | TextFrame, Field(discriminator="kind")] | None = Field(
-        None, description="layout of a frame; null: the board exists only as archived Parquet logs"
+        None, description="layout of a frame; null: the board exists only as logs"
     )
     log_channels: tuple[str, ...] = Field(
         (), description="channels of a board without frame; empty: those of its gyros and temperatures"
@@ -190,6 +192,13 @@ class Board(StrictModel):
     temperatures: tuple[Temperature, ...] = Field((), description="the temperature channels")
 
     @property
+    def frame_rate_hz(self) -> float:
+        """Frames a second of a board with frames.  raises : ConfigError if it has none"""
+        if self.rate_hz is None:
+            raise ConfigError("has no rate_hz", f"board {self.name!r}", "say how many frames it sends a second")
+        return self.rate_hz
+
+    @property
     def channels(self) -> list[str]:
         """Names of all channels: of a frame, in its order, or of the log."""
         if self.frame is not None:
@@ -199,10 +208,10 @@ class Board(StrictModel):
 
     @property
     def layout(self) -> BinaryFrame | TextFrame:
-        """The frame.  raises : ConfigError if the board exists only as archived logs"""
+        """The frame.  raises : ConfigError if the board exists only as logs"""
         if self.frame is None:
-            remedy = "set `parquet:` for the recording, or add `frame:` to the board file"
-            raise ConfigError("has no frame: it exists only as archived Parquet logs", f"board {self.name!r}", remedy)
+            remedy = "set `log:` for the recording, or add `frame:` to the board file"
+            raise ConfigError("has no frame: it exists only as logs", f"board {self.name!r}", remedy)
         return self.frame
 
     @property
@@ -216,6 +225,8 @@ class Board(StrictModel):
 
     @model_validator(mode="after")
     def _names_exist(self) -> Board:
+        if self.frame is not None and self.rate_hz is None:
+            raise ValueError("rate_hz is missing: a board with frames sends so many a second")
         if self.frame is None and (self.counter or self.timestamp):
             raise ValueError("counter and timestamp need a frame; a log's time is named by the manifest")
         if self.frame is not None and self.log_channels:

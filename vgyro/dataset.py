@@ -8,6 +8,7 @@ from pydantic import Field, field_validator, model_validator
 
 from vgyro.board import Board
 from vgyro.config import PARTIAL, Analysis
+from vgyro.log import Log, LogArray, Values, board_of_log
 from vgyro.validation import Problem, StrictModel, did_you_mean, parse_model
 
 Kind = Literal["calibration", "static", "constant", "random", "sinusoid", "thermal", "free"]
@@ -67,27 +68,26 @@ Reference = Annotated[
 ]
 
 
-class ParquetLog(StrictModel):
-    """An archived log instead of dumps. `columns` maps the board's channels (or gyros) to the log's columns."""
-
-    columns: dict[str, str] = Field(default={}, description="channel or gyro of the board: column of the log")
-    values: Literal["counts", "rates"] = Field("counts", description="rates: deg/s already, not calibrated again")
-    time: str | None = Field(None, description="column with the time in s; null: row number / rate_hz")
-
-
 class Recording(StrictModel):
     """One run of the board."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", description="letters, digits, - and _")
     kind: Kind = Field(description="what the board did")
-    files: tuple[str, ...] = Field(min_length=1, description="dumps in order, or a Parquet file or folder; globs too")
-    parquet: ParquetLog | None = Field(None, description="set: the files are Parquet logs")
-    rate_hz: float | None = Field(None, gt=0, description="null: the board's")
+    files: tuple[str, ...] = Field(min_length=1, description="dumps or logs in order; globs and folders of logs too")
+    log: Log | None = Field(None, description="set: the files are logs, tables with columns; null: dumps of the board")
+    rate_hz: float | None = Field(None, gt=0, description="null: by the stamps, or the board's")
     rest: tuple[tuple[float, float], ...] | Literal["auto"] = Field(
         "auto", description="known standstill, [start, stop] in s; auto: all of a static recording, found in a free one"
     )
     reference: Reference | None = Field(None, description="the true rate, where it is known")
     axis: str | None = Field(None, description="the axis that the reference turns about; null: the board's only one")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _parquet_is_log(cls, data: object) -> object:
+        if isinstance(data, dict) and "parquet" in data:
+            raise ValueError("`parquet:` is now `log:`, with the same keys; rename it")
+        return data
 
     @field_validator("files", mode="before")
     @classmethod
@@ -106,7 +106,10 @@ class Recording(StrictModel):
 class Manifest(StrictModel):
     """raw/<dataset>/dataset.yaml"""
 
-    board: str = Field(description="name of a file in config/boards, or a path to one, from the manifest's folder")
+    board: str | None = Field(
+        None, description="name of a file in config/boards, or a path to one, from the manifest's folder"
+    )
+    array: LogArray | None = Field(None, description="the gyros of logs, in place of `board`")
     title: str = Field("", description="heading of the report")
     simulated: bool = Field(False, description="true: every page says so")
     twin: str | None = Field(None, description="the twin that made the data, where it is simulated")
@@ -116,6 +119,15 @@ class Manifest(StrictModel):
     notes: str = Field("", description="free text, shown in the report")
     recordings: tuple[Recording, ...] = Field(min_length=1, description="the runs of the board")
     analysis: Analysis | None = Field(None, description="keys of config.yaml's `analysis` to override")
+
+    @model_validator(mode="after")
+    def _board_or_array(self) -> Manifest:
+        if (self.board is None) == (self.array is None):
+            raise ValueError("one of `board` (a board file) and `array` (the gyros of logs) is needed, and not both")
+        for recording in self.recordings if self.array else ():
+            if recording.log is None:
+                raise ValueError(f"recording {recording.name!r} needs `log:`, for `array` names gyros of logs")
+        return self
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Manifest:
@@ -130,6 +142,20 @@ class Manifest(StrictModel):
     def recording(self, name: str) -> Recording:
         """The recording of that name."""
         return next(recording for recording in self.recordings if recording.name == name)
+
+
+def values_of(manifest: Manifest, recording: Recording) -> Values:
+    """Does a recording hold counts, or rates in deg/s, which are not calibrated again?"""
+    if recording.log is None:
+        return "counts"
+    if manifest.array is not None:
+        return "rates" if manifest.array.rates else "counts"
+    return recording.log.values
+
+
+def array_board(manifest: Manifest, name: str) -> Board | None:
+    """The board that a manifest's `array` makes; None where it names a board file."""
+    return None if manifest.array is None else board_of_log(manifest.array, name, manifest.title or name)
 
 
 def parse_manifest(text: str, source: str) -> Manifest:
@@ -159,12 +185,12 @@ def check_against_board(manifest: Manifest, board: Board, source: str) -> list[P
     for index, recording in enumerate(manifest.recordings):
         key = f"recordings.{index}"
         problems += [Problem(source, 1, f"{key}.{place}", text) for place, text in _axis_problems(recording, axes)]
-        if recording.parquet is not None:
+        if recording.log is not None:
             known = list(dict.fromkeys([*board.channels, *names]))
-            for channel in recording.parquet.columns:
+            for channel in recording.log.columns:
                 if channel not in known:
                     message = f"board {board.name!r} has no channel {channel!r}{did_you_mean(channel, known)}"
-                    problems.append(Problem(source, 1, f"{key}.parquet.columns.{channel}", message))
+                    problems.append(Problem(source, 1, f"{key}.log.columns.{channel}", message))
     return problems
 
 

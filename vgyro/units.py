@@ -75,6 +75,11 @@ def deg_from_rad(angle: Quantity) -> Quantity:
     return angle * (180.0 / math.pi)
 
 
+def deg_s_from_mdps(rate: Quantity) -> Quantity:
+    """Rate, 0.001 deg/s → deg/s."""
+    return rate / 1000.0
+
+
 def parts_per_million(ratio: Quantity) -> Quantity:
     """Dimensionless ratio → ppm."""
     return ratio * 1e6

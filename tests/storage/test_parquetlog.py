@@ -6,7 +6,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from vgyro.config import IntegrityOptions
-from vgyro.dataset import ParquetLog, Recording
+from vgyro.dataset import Recording
+from vgyro.log import Log
 from vgyro.errors import DataError
 from vgyro.storage import Refused, open_recording
 from vgyro.storage.frames import gather
@@ -23,7 +24,7 @@ def values():
 @pytest.fixture
 def read(board):
     def run(paths, options=None, **log):
-        recording = Recording(name="a", kind="static", files=("x",), parquet=ParquetLog(**log))
+        recording = Recording(name="a", kind="static", files=("x",), log=Log(**log))
         paths = paths if isinstance(paths, list) else [paths]
         reader = open_recording(paths, recording, board("adis16405"), options or IntegrityOptions())
         frames = gather(reader, board("adis16405"))

@@ -5,7 +5,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from vgyro.config import IntegrityOptions
-from vgyro.dataset import ParquetLog, Recording
+from vgyro.dataset import Recording
+from vgyro.log import Log
 from vgyro.storage import decode_dump, open_recording
 from vgyro.storage.frames import gather
 from vgyro.storage.sniff import all_boards, sniff
@@ -36,7 +37,7 @@ def test_sniff_knows_the_mimu(shared_data, boards):
 
 def test_adis_log(shared_data, board):
     path = shared_data / "adis16405-static" / "rec4.parquet"
-    recording = Recording(name="rec4", kind="static", files=("rec4.parquet",), parquet=ParquetLog())
+    recording = Recording(name="rec4", kind="static", files=("rec4.parquet",), log=Log())
     reader = open_recording([path], recording, board("adis16405"), IntegrityOptions())
     frames = gather(reader, board("adis16405"))
     table = pq.read_table(path)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from vgyro.dataset import Kind, Manifest, ParquetLog, Recording
+from vgyro.dataset import Kind, Manifest, Recording
 from vgyro.describe import type_text, value_text
+from vgyro.log import Log as ParquetLog
 
 WIDTH = 120
 
@@ -100,7 +101,7 @@ def _recording(draft: RecordingDraft, explained: bool) -> Iterator[str]:
     yield from _key(Recording, "axis", None, indent)
     yield f"{indent}# {Recording.model_fields['reference'].description}; deg/s and s; one of\n{REFERENCES}"
     if draft.log is None:
-        yield from _key(Recording, "parquet", None, indent)
+        yield from _key(Recording, "log", None, indent)
     yield from _log(draft.log, indent)
 
 
@@ -110,7 +111,7 @@ def _log(log: LogDraft | None, indent: str) -> Iterator[str]:
     fields = ParquetLog.model_fields
     yield f"{indent}# {Recording.model_fields['parquet'].description}; the log has the columns\n"
     yield from (f"{indent}#   {line}\n" for line in _wrapped(log.there, WIDTH - len(indent) - 4))
-    yield f"{indent}parquet:\n"
+    yield f"{indent}log:\n"
     kind = "floating-point" if log.values == "rates" else "whole"
     yield f"{indent}  # {fields['values'].description}; a guess, for the columns hold {kind} numbers\n"
     yield f"{indent}  values: {log.values}\n"

@@ -28,7 +28,7 @@ def encode_frames(
 
     counter : [T], frame number without wraps; it is wrapped, and stepped, as the board does
     counts  : channel → [T]; a channel that is left out is 0 (or what the frame requires there)
-    time    : [T], s, for the time stamp of a board that sends one; None: counter / board.rate_hz
+    time    : [T], s, for the time stamp of a board that sends one; None: counter / board.frame_rate_hz
     raises  : DataError for a channel that the board lacks or a value that does not fit its field; ConfigError for a
               board that sends no frames
     """
@@ -49,7 +49,7 @@ def encode(
     if board.counter is not None:
         values[board.counter.field] = counter * board.counter.step % board.counter.modulus
     if board.timestamp is not None:
-        clock = counter / board.rate_hz if time is None else np.asarray(time)
+        clock = counter / board.frame_rate_hz if time is None else np.asarray(time)
         ticks = np.rint(clock / board.timestamp.tick_s).astype(np.int64)
         values[board.timestamp.field] = ticks % board.timestamp.wrap if board.timestamp.wrap else ticks
     frame = board.layout

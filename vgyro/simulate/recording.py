@@ -100,7 +100,7 @@ def simulate_pieces(twin: Twin, board: Board, recording: str, seed: int | None =
 def rows_of(twin: Twin, board: Board, recording: str) -> tuple[int, float]:
     """Samples of a recording, and how many there are a second.  raises : DataError if there are fewer than two"""
     spec = twin.recording(recording)
-    rate_hz = spec.rate_hz or board.rate_hz
+    rate_hz = spec.rate_hz or board.frame_rate_hz
     samples = round(spec.duration * rate_hz)
     if samples < 2:
         raise DataError(f"recording {recording!r} of {spec.duration} s at {rate_hz} Hz holds {samples} samples")

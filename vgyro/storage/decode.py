@@ -27,7 +27,7 @@ def decode_dump(
     raises  : DataError for a missing or empty file, a file of another board, too few good frames
     """
     paths = [paths] if isinstance(paths, str | Path) else list(paths)
-    reader = DumpReader(paths, board, board.rate_hz, options or IntegrityOptions(), engine=engine)
+    reader = DumpReader(paths, board, board.frame_rate_hz, options or IntegrityOptions(), engine=engine)
     frames = gather(reader, board)
     return frames._replace(integrity=reader.integrity)
 
@@ -48,7 +48,7 @@ def open_recording(
     boards  : folder of the boards that are tried when this one does not fit
     engine  : of the search for the frames of a dump
     """
-    rate_hz = recording.rate_hz or board.rate_hz
-    if recording.parquet is not None:
-        return LogReader(paths, recording.parquet, board, rate_hz, options)
+    rate_hz = recording.rate_hz or board.frame_rate_hz
+    if recording.log is not None:
+        return LogReader(paths, recording.log, board, rate_hz, options)
     return DumpReader(paths, board, rate_hz, options, chunk_bytes, boards, engine)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vgyro.board import Board, parse_board
 from vgyro.config import Config, parse_config
-from vgyro.dataset import Manifest, check_against_board, parse_manifest, used_board
+from vgyro.dataset import Manifest, array_board, check_against_board, parse_manifest, used_board
 from vgyro.errors import ConfigError
 from vgyro.validation import InvalidFile, Problem, did_you_mean, locate
 
@@ -42,7 +42,8 @@ def read_dataset(path: str | Path, boards: Path = BOARDS) -> tuple[Manifest, Boa
     text = _text(path)
     manifest = parse_manifest(text, source)
     try:
-        board = read_board(manifest.board, Path(path).parent, boards)
+        board = array_board(manifest, Path(path).resolve().parent.name)
+        board = board or read_board(str(manifest.board), Path(path).parent, boards)
     except InvalidFile:
         raise
     except ConfigError as error:

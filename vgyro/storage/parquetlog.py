@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 
 from vgyro.board import Board
 from vgyro.config import IntegrityOptions
-from vgyro.dataset import ParquetLog
 from vgyro.errors import DataError
+from vgyro.log import Log as ParquetLog
 from vgyro.storage.frames import Frames, channel_watches
 from vgyro.storage.integrity import FileRecord, Integrity, Ledger
 from vgyro.storage.layout import kept_channels

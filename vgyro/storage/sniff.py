@@ -75,7 +75,7 @@ def probe(sources: Sources, board: Board) -> Probe:
 def _period(found: Found, board: Board) -> float | None:
     if board.timestamp is None:
         return None
-    default = 1 / (board.rate_hz * board.timestamp.tick_s)
+    default = 1 / (board.frame_rate_hz * board.timestamp.tick_s)
     if found.stamp is None or len(found.stamp) < 2:
         return default
     steps = np.diff(found.stamp)

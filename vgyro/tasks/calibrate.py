@@ -21,7 +21,7 @@ from vgyro.calibration import (
 )
 from vgyro.calibration.figures import FIGURES
 from vgyro.config import CalibrationOptions
-from vgyro.dataset import FileReference, Manifest
+from vgyro.dataset import FileReference, Manifest, values_of
 from vgyro.storage.tables import read_json, write_json
 from vgyro.tasks.block_means import thermometer_of
 from vgyro.tasks.calibrate_tables import Source, Test, cross_axes, fit_tests, nominal_of
@@ -90,7 +90,7 @@ def usable(task: Task, manifest: Manifest) -> tuple[list[Source], dict[str, str]
             log = next(logs, None)
         if read_json(integrity)["status"] == "refused":
             reason = "refused: see its integrity record"
-        elif recording.parquet is not None and recording.parquet.values == "rates":
+        elif values_of(manifest, recording) == "rates":
             reason = "holds rates, not counts: nothing to calibrate"
         else:
             sources.append(Source(recording, frames, log))

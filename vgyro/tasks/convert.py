@@ -21,7 +21,8 @@ from vgyro.calibration import (
     to_rates,
 )
 from vgyro.config import RestOptions
-from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, Recording, SinusoidReference
+from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, Recording, SinusoidReference, values_of
+from vgyro.log import Values
 from vgyro.storage.tables import TableWriter, read_batches, read_column, read_json
 from vgyro.tasks.block_means import block_means
 from vgyro.tasks.common import Task, run_task
@@ -44,7 +45,9 @@ def main(task: Task) -> None:
     frames = task.input("frames")
     time = read_column(frames, "time")
     rate_hz = sample_rate(recording, board, time)
-    converter = Converter(board, recording, read_json(task.input("calibration"))["gyros"])
+    converter = Converter(
+        board, recording, read_json(task.input("calibration"))["gyros"], values_of(manifest, recording)
+    )
     converter.read_temperatures(frames, rate_hz)
     options = RestOptions.model_validate(task.options["analysis"].get("rest", {}))
     clipped = converter.clipped(frames)
@@ -82,10 +85,10 @@ def main(task: Task) -> None:
 class Converter:
     """What turns the columns of one recording's frames into rates."""
 
-    def __init__(self, board: Board, recording: Recording, calibration: dict[str, Any]) -> None:
+    def __init__(self, board: Board, recording: Recording, calibration: dict[str, Any], values: Values) -> None:
         self.board, self.recording = board, recording
         self.gyros = {gyro.name: calibration[gyro.name] for gyro in board.gyros}
-        self.rates = recording.parquet is not None and recording.parquet.values == "rates"
+        self.rates = values == "rates"
         fields = [*(gyro.field for gyro in board.gyros), *(temperature.field for temperature in board.temperatures)]
         self.columns = ["time", "segment", *dict.fromkeys(fields)]
         self.compensations = {} if self.rates else compensations_of(self.gyros)

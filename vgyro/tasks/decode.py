@@ -9,8 +9,9 @@ from typing import Any
 
 from vgyro.board import Board
 from vgyro.config import IntegrityOptions
-from vgyro.dataset import Manifest, Recording
+from vgyro.dataset import Manifest, Recording, values_of
 from vgyro.errors import DataError
+from vgyro.log import Values
 from vgyro.storage.decode import open_recording
 from vgyro.storage.frames import Frames, Reader, empty_frames
 from vgyro.storage.integrity import Integrity, Refused
@@ -30,19 +31,18 @@ def main(task: Task) -> None:
     recording = manifest.recording(task.options["recording"])
     analysis = task.options.get("analysis", {})
     options = IntegrityOptions.model_validate(analysis.get("integrity", {}))
+    values = values_of(manifest, recording)
     provenance = _provenance(task)
     try:
         reader = open_recording(
             task.inputs["files"], recording, board, options, engine=analysis.get("engine", "native")
         )
-        record = decode(reader, task.output("frames"), provenance, _extra(board, recording))
+        record = decode(reader, task.output("frames"), provenance, _extra(board, values))
         for reason in record.reasons:
             _say(f"{recording.name}: suspect: {reason}")
     except DataError as error:
         record = _record_of(error, board, recording)
-        write_table(
-            task.output("frames"), columns_of(empty_frames(board)), "frames", provenance, _extra(board, recording)
-        )
+        write_table(task.output("frames"), columns_of(empty_frames(board)), "frames", provenance, _extra(board, values))
         logging.exception("%s", error)
         _say(str(error))
     write_json(task.output("integrity"), {"recording": recording.name, **record.to_json()})
@@ -69,8 +69,8 @@ def _record_of(error: DataError, board: Board, recording: Recording) -> Integrit
     return unreadable_record(board, recording.rate_hz or board.rate_hz, error)
 
 
-def _extra(board: Board, recording: Recording) -> dict[str, str]:
-    return {"board": board.name, "values": recording.parquet.values if recording.parquet else "counts"}
+def _extra(board: Board, values: Values) -> dict[str, str]:
+    return {"board": board.name, "values": values}
 
 
 def _provenance(task: Task) -> Provenance:

@@ -17,6 +17,6 @@ def load_twins(names: Iterable[str], twins: str | Path, folder: str | Path, boar
     for name in names:
         path = Path(twins) / f"{name}.yaml"
         manifest = manifest_of(parse_twin(path.read_text(encoding="utf-8"), str(path)))
-        board = read_board(manifest.board, boards=Path(boards))
+        board = read_board(str(manifest.board), boards=Path(boards))
         datasets[name] = Dataset(manifest, used_board(manifest, board), Path(folder) / name)
     return datasets
