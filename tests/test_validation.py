@@ -43,7 +43,7 @@ def test_an_empty_list_is_too_short():
 
 def test_missing_keys_are_named_at_the_line_of_what_lacks_them():
     assert mistakes("title: t\nrecordings:\n- name: a\n  files: f\n") == [
-        "1: board: missing; this key is required",
+        "1: board: missing; name a board file, or the gyros of a log under `array`",
         "3: recordings.0.kind: missing; this key is required",
     ]
 
@@ -62,11 +62,11 @@ def test_missing_keys_are_named_at_the_line_of_what_lacks_them():
         ("rest: [[0, 10], [20, soon]]", "rest.1.1: expected a number, found 'soon'"),
         ("rest: [[0, 10, 20]]", "rest.0: expected at most 2 items, found 3"),
         ("log: {values: count}",
-         "parquet.values: expected one of counts, rates; found 'count'; did you mean 'counts'?"),
-        ("log: {columns: {g1: 1}}", "log.columns.g1: expected text, found 1; put it in quotes"),
+         "log.values: expected one of counts, rates; found 'count'; did you mean 'counts'?"),
+        ("log: {columns: {g1: 1}}", "log.columns.g1: expected text or keys and values, found 1"),
         ("log: log", "log: expected keys and values, found 'log'"),
         ("log: {colums: {}}", "log.colums: unknown key; did you mean 'columns'?"),
-        ("log: {xyz: 1}", "log.xyz: unknown key; known: columns, values, time"),
+        ("log: {xyz: 1}", "log.xyz: unknown key; known: family, table, text, columns, values, time, clocks"),
     ],
 )  # fmt: skip
 def test_one_mistake_makes_one_message(line, expected):

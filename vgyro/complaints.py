@@ -75,7 +75,7 @@ def _path_of(error: Any, data: Any) -> Path:
                 tagged = True
             elif step in node:
                 path, node, tagged = (*path, step), node[step], False
-            elif last and error["type"] == "missing":
+            elif last and error["type"] in {"missing", "value_error"}:
                 path = (*path, step)
         elif isinstance(node, list) and isinstance(step, int) and step < len(node):
             path, node, tagged = (*path, step), node[step], False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from vgyro.board import Board
 from vgyro.config import PARTIAL, Analysis
@@ -106,10 +106,10 @@ class Recording(StrictModel):
 class Manifest(StrictModel):
     """raw/<dataset>/dataset.yaml"""
 
+    array: LogArray | None = Field(None, description="the gyros of logs, in place of `board`")
     board: str | None = Field(
         None, description="name of a file in config/boards, or a path to one, from the manifest's folder"
     )
-    array: LogArray | None = Field(None, description="the gyros of logs, in place of `board`")
     title: str = Field("", description="heading of the report")
     simulated: bool = Field(False, description="true: every page says so")
     twin: str | None = Field(None, description="the twin that made the data, where it is simulated")
@@ -120,10 +120,18 @@ class Manifest(StrictModel):
     recordings: tuple[Recording, ...] = Field(min_length=1, description="the runs of the board")
     analysis: Analysis | None = Field(None, description="keys of config.yaml's `analysis` to override")
 
+    @field_validator("board")
+    @classmethod
+    def _board_or_array(cls, value: str | None, info: ValidationInfo) -> str | None:
+        # A default is validated, too; an `array` with a mistake of its own is not there.
+        if value is None and "array" in info.data and info.data["array"] is None:
+            raise ValueError("missing; name a board file, or the gyros of a log under `array`")
+        if value is not None and info.data.get("array") is not None:
+            raise ValueError("there is `array`, too: keep one of them")
+        return value
+
     @model_validator(mode="after")
-    def _board_or_array(self) -> Manifest:
-        if (self.board is None) == (self.array is None):
-            raise ValueError("one of `board` (a board file) and `array` (the gyros of logs) is needed, and not both")
+    def _array_of_logs(self) -> Manifest:
         for recording in self.recordings if self.array else ():
             if recording.log is None:
                 raise ValueError(f"recording {recording.name!r} needs `log:`, for `array` names gyros of logs")

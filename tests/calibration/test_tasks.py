@@ -223,7 +223,7 @@ def test_sinusoid_with_unknown_phase_and_logged_motion(tmp_path: Path, board: Bo
 
 
 def test_a_log_of_rates_is_not_calibrated(tmp_path: Path, board: Board):
-    entry = {"name": "log", "kind": "static", "files": "x.parquet", "parquet": {"values": "rates"}}
+    entry = {"name": "log", "kind": "static", "files": "x.parquet", "log": {"values": "rates"}}
     record = manifest(entry)
     uncalibrated(tmp_path, board, record)
     columns = counts_of(board, np.zeros(300))
