@@ -32,6 +32,9 @@ class IntegrityOptions(StrictModel):
     max_rate_error: float = Field(0.02, gt=0, description="warn when measured and declared rate differ by more, ratio")
     stuck_s: float = Field(1.0, gt=0, description="a channel that repeats one count for longer than this is stuck, s")
     max_clipped_share: float = Field(0.01, ge=0, le=1, description="warn when a larger share of samples is clipped")
+    refuse_clipped_share: float = Field(
+        0.9, gt=0, le=1, description="refuse a recording of which a larger share is clipped on nearly all gyros"
+    )
 
 
 class RestOptions(StrictModel):

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vgyro.board import Board
+from vgyro.board import Board, Gyro
 from vgyro.storage.integrity import ChannelWatch, Integrity
 from vgyro.storage.layout import channel_types, kept_channels
 
@@ -73,18 +73,28 @@ def empty_frames(board: Board) -> Frames:
     return Frames(counts, np.empty(0, np.int64), np.empty(0, np.float64), np.empty(0, np.int32))
 
 
+def gyro_rails(board: Board, gyro: Gyro, rates: bool = False) -> tuple[float, float]:
+    """Lowest and highest value of a gyro's channel: what lies there or beyond is clipped, or no value of this gyro.
+
+    rates   : the channel holds deg/s, not counts
+    returns : the rails of the converter; where these are not known, or a log holds rates, what the gyro's range comes
+              to by its data sheet; -inf and inf where that is not known, either. Counts, or deg/s where rates.
+    The one rule for what the page says of clipping (decode) and what is left out of the figures at rest (convert).
+    """
+    if board.adc is not None and not rates:
+        return float(board.adc.low), float(board.adc.high)
+    if gyro.range_deg_s is None:
+        return -np.inf, np.inf
+    reach = gyro.range_deg_s / (1.0 if rates else gyro.scale)
+    middle = 0.0 if rates else gyro.bias
+    return middle - reach, middle + reach
+
+
 def channel_watches(board: Board, rates: bool = False, engine: str = "native") -> dict[str, ChannelWatch]:
-    """A watch for every gyro and temperature channel; rails by the converter, else by the gyro's range."""
-    watches = {}
+    """A watch for every gyro and temperature channel; rails of gyros as gyro_rails says, of others the converter's."""
+    watches = {gyro.field: ChannelWatch(*gyro_rails(board, gyro, rates), engine) for gyro in board.gyros}
     adc = None if rates else board.adc
-    for gyro in board.gyros:
-        low, high = (-np.inf, np.inf) if adc is None else (float(adc.low), float(adc.high))
-        if adc is None and gyro.range_deg_s is not None:
-            reach = gyro.range_deg_s / (1.0 if rates else gyro.scale)
-            middle = 0.0 if rates else gyro.bias
-            low, high = middle - reach, middle + reach
-        watches[gyro.field] = ChannelWatch(low, high, engine)
+    rails = (-np.inf, np.inf) if adc is None else (float(adc.low), float(adc.high))
     for temperature in board.temperatures:
-        low, high = (-np.inf, np.inf) if adc is None else (float(adc.low), float(adc.high))
-        watches.setdefault(temperature.field, ChannelWatch(low, high, engine))
+        watches.setdefault(temperature.field, ChannelWatch(*rails, engine))
     return watches

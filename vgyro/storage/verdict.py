@@ -22,6 +22,7 @@ from vgyro.storage.integrity import (
 )
 
 SUSPECT_SHARE = 0.99
+NEARLY_ALL_GYROS = 0.9
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,10 @@ def conclude(
     options: IntegrityOptions,
     hints: list[str],
 ) -> Integrity:
-    """The integrity record, good or suspect; see refuse_if_needed."""
+    """The integrity record: good or suspect, or refused because the values are not of this board.
+
+    See refuse_if_needed, which raises what the record says.
+    """
     board, declared, measured = outcome.board, outcome.declared_rate_hz, outcome.measured_rate_hz
     share = good_share(outcome.good, ledger.bad, ledger.lost)
     frames = FrameCount(outcome.good, ledger.bad, ledger.lost, outcome.repeated, share)
@@ -55,9 +59,11 @@ def conclude(
     reasons = [f"{rate_note}: the measured rate is used"] if contradicts else []
     reasons += suspicions(board, frames, ledger, channels, options)
     rate = measured if contradicts and measured is not None else declared
+    foreign = out_of_range(board, channels, options)
+    reasons = [foreign, *reasons] if foreign else reasons
     return Integrity(
         board=board.name,
-        status="suspect" if reasons else "good",
+        status="refused" if foreign else "suspect" if reasons else "good",
         reasons=reasons,
         warnings=notes(board, ledger, outcome.still) + hints,
         values=outcome.values,
@@ -79,8 +85,12 @@ def conclude(
 
 
 def refuse_if_needed(record: Integrity, options: IntegrityOptions, where: str, remedy: Callable[[], str]) -> None:
-    """raises : Refused if there is no good frame, or too small a share of them"""
-    frames = record.frames
+    """raises : Refused if there is no good frame, or too small a share of them, or if the record is refused already
+
+    where, remedy : the file; what to do about frames that are not good
+    """
+    frames, reasons = record.frames, record.reasons
+    advice = remedy
     if frames.good == 0:
         size = sum(file.content_bytes for file in record.files)
         what = f"no good frame of board {record.board} in {size} bytes, from byte 0 to the end"
@@ -89,11 +99,34 @@ def refuse_if_needed(record: Integrity, options: IntegrityOptions, where: str, r
         counts = f"{frames.good} good, {frames.lost} lost, {frames.bad} damaged{first}"
         limit = f"integrity.min_good_share = {percent(options.min_good_share)}"
         what = f"only {percent(frames.good_share)} of the frames are good ({counts}), less than {limit}"
+    elif record.status == "refused":
+        what, *reasons = record.reasons
+        advice = _out_of_range_remedy
     else:
         return
-    message = Refused(record, what, where, remedy())
-    message.integrity = replace(record, status="refused", reasons=[str(message), *record.reasons])
+    message = Refused(record, what, where, advice())
+    message.integrity = replace(record, status="refused", reasons=[str(message), *reasons])
     raise message
+
+
+def _out_of_range_remedy() -> str:
+    return (
+        "is this the right board, with the right unit and the right type, byte order and scale of its channels? See"
+        " `board` and `log` in the manifest and the board file. If the gyros were at their limits all along, measure"
+        " again"
+    )
+
+
+def out_of_range(board: Board, channels: dict[str, ChannelRecord], options: IntegrityOptions) -> str:
+    """Why the values cannot be this board's: nearly all samples of nearly all gyros at the rails; "" if they can."""
+    limit = options.refuse_clipped_share
+    shares = {gyro.name: channels[gyro.field].clipped_share for gyro in board.gyros if gyro.field in channels}
+    beyond = [name for name, share in shares.items() if share > limit]
+    if not beyond or len(beyond) < NEARLY_ALL_GYROS * len(board.gyros):
+        return ""
+    many = f"{len(beyond)} of {len(board.gyros)} gyros ({listed(beyond)})"
+    text = f"the values are out of the range of board {board.name}: more than {percent(limit)} of the samples of {many}"
+    return f"{text} lie at or beyond its limits (integrity.refuse_clipped_share = {limit:g})"
 
 
 def rate_check(board: Board, declared: float, measured: float | None, options: IntegrityOptions) -> tuple[str, bool]:

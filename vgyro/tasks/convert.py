@@ -23,6 +23,7 @@ from vgyro.calibration import (
 from vgyro.config import RestOptions
 from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, Recording, SinusoidReference, values_of
 from vgyro.log import Values
+from vgyro.storage.frames import gyro_rails
 from vgyro.storage.tables import TableWriter, read_batches, read_column, read_json
 from vgyro.tasks.block_means import block_means
 from vgyro.tasks.common import Task, run_task
@@ -149,11 +150,16 @@ class Converter:
         return {f"temp_{t.name}": raw[t.field].astype(float) * t.scale + t.offset for t in self.board.temperatures}
 
     def clipped(self, frames: Path) -> dict[str, np.ndarray]:
-        """Gyro → bool [T], true at a rail of the converter; empty where the rails are not known."""
-        if self.board.adc is None or self.rates:
-            return {}
-        rails = (self.board.adc.low, self.board.adc.high)
-        return {gyro.name: clipped_samples(read_column(frames, gyro.field), rails) for gyro in self.board.gyros}
+        """Gyro → bool [T], true at a rail of its converter or range; without the gyros whose rails are not known.
+
+        The rule is that of decode: vgyro.storage.frames.gyro_rails.
+        """
+        rails = [(gyro, gyro_rails(self.board, gyro, self.rates)) for gyro in self.board.gyros]
+        return {
+            gyro.name: clipped_samples(read_column(frames, gyro.field), known)
+            for gyro, known in rails
+            if np.isfinite(known).any()
+        }
 
     def array(self, frames: Path, names: list[str]) -> np.ndarray:
         """Rates [T, n] of some gyros, in single precision."""
