@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vgyro.board import BinaryFrame, Board
+from vgyro.board import BinaryFrame, Board, TextFrame
 from vgyro.config import IntegrityOptions
 from vgyro.storage.clock import LOST, PAUSE, Clock, Timed
 from vgyro.storage.frames import Frames, channel_watches
@@ -18,6 +18,7 @@ from vgyro.storage.integrity import FileRecord, Gap, Integrity, Ledger
 from vgyro.storage.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Found, Tail
 from vgyro.storage.sniff import Probe, boards_that_fit, probe, scanner_of
 from vgyro.storage.sources import Sources, open_sources
+from vgyro.storage.textrefusal import describe, first_line, line_number, refuse_text
 from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
 
 CHUNK_BYTES = 1 << 22
@@ -26,7 +27,8 @@ BOOT_BYTES = 4096  # an acknowledgement or boot text of so many bytes is not hel
 LARGEST_FREED = 31 << 20
 
 LEADING = "leading bytes"
-SEEN = ("checksum", "marked invalid by the board", "truncated at the end")
+FORM = "form"  # a line of a text without checksum that is not as the board's lines are
+SEEN = ("checksum", FORM, "marked invalid by the board", "truncated at the end")
 CAUSES = {NO_SYNC: "no sync", BAD_CHECKSUM: "checksum", INVALID: "marked invalid by the board"}
 
 
@@ -52,6 +54,10 @@ class DumpReader:
         self._time: float | None = None  # of the last kept frame
         self._segment = 0
         self._watches = channel_watches(self.board, engine=self.engine)
+        # Of a text without checksum only the form of a line tells that it is damaged.
+        layout = self.board.layout
+        self._checked = isinstance(layout, BinaryFrame) or layout.checksum.family != "none"
+        self._cut_line: int | None = None
 
     @property
     def expected_frames(self) -> int:
@@ -65,7 +71,7 @@ class DumpReader:
         np.empty(LARGEST_FREED, dtype=np.uint8)
         seen = probe(self._sources, self.board)
         self._probe = seen
-        scanner = scanner_of(self.board, seen.typical_length, self.engine)
+        scanner = self._scanner = scanner_of(self.board, seen.typical_length, self.engine, seen.forms)
         self._clock = Clock(self.board, self.rate_hz, seen.period_ticks, seen.typical_length)
         self._length = seen.typical_length
         for block in self._sources.chunks(self.chunk_bytes):
@@ -100,8 +106,11 @@ class DumpReader:
             start, jump = holes.get(row, stop), jumps.get(row)
             if stop > start:
                 lost = (jump.lost or 0) if jump else 0
-                cause = self._cause(start, stop, damage, borders)
-                self._note_damage(start, stop, lost, cause, borders, estimate=self._time is None and row == 0)
+                hole = found.holes.get(row)
+                first, last = (start, stop) if hole is None else (hole.first, hole.last)
+                cause = self._cause(first, last, damage, borders)
+                estimate = self._time is None and row == 0
+                self._note_damage(first, last, lost, cause, borders, estimate, hole.lines if hole else None)
             if jump:
                 last = timed.time.item(jump.row - 1) if jump.row else self._time or 0.0
                 due = last + 1 / self.rate_hz
@@ -116,11 +125,14 @@ class DumpReader:
             cause = self._cause(tail.start, tail.stop, tail.damage, borders)
             if tail.broken_off and tail.stop - tail.start < 2 * self._length:
                 cause = "truncated at the end"
-            self._note_damage(tail.start, tail.stop, 0, cause, borders, estimate=True)
+            self._cut_line = tail.start if tail.lines == 1 and tail.broken_off else None
+            self._note_damage(tail.start, tail.stop, 0, cause, borders, estimate=True, lines=tail.lines)
 
-    def _note_damage(self, start: int, stop: int, lost: int, cause: str, borders: list[int], estimate: bool) -> None:
+    def _note_damage(
+        self, start: int, stop: int, lost: int, cause: str, borders: list[int], estimate: bool, lines: int | None = None
+    ) -> None:
         """Write damaged bytes down, a file at a time; the frames are lost in the file that holds most of the bytes."""
-        frames = max(int(cause in SEEN), round((stop - start) / self._length))
+        frames = max(int(cause in SEEN), round((stop - start) / self._length)) if lines is None else lines
         if cause != LEADING or stop - start > BOOT_BYTES:
             self._ledger.bad += frames
         if estimate:
@@ -141,7 +153,7 @@ class DumpReader:
         shortest = self._length if isinstance(self.board.layout, BinaryFrame) else 2 * self._length
         if begins and (damage == NO_SYNC or stop - start < shortest):
             return LEADING
-        return CAUSES[damage]
+        return FORM if damage == BAD_CHECKSUM and not self._checked else CAUSES[damage]
 
     def _conclude(self) -> None:
         where = str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more"
@@ -158,8 +170,35 @@ class DumpReader:
             still=self._clock.still,
         )
         watches = {name: watch.record() for name, watch in self._watches.items()}
-        self.integrity = conclude(outcome, self._ledger, watches, self.options, self._hints(self._probe))
+        fault = self._fault()
+        hints = self._hints(self._probe) + self._text_hints(fault)
+        self.integrity = conclude(outcome, self._ledger, watches, self.options, hints)
+        if isinstance(self.board.layout, TextFrame):
+            others = self._scanner.others
+            refuse_text(self.integrity, self.options, where, fault, others, self._remedy)
         refuse_if_needed(self.integrity, self.options, where, self._remedy)
+
+    def _fault(self) -> str:
+        """Where a text has lines that do not fit: which is the first, and why."""
+        frame, refused = self.board.layout, self._scanner.refused
+        if not isinstance(frame, TextFrame) or (refused is None and self._good):
+            return ""
+        place, line = refused or first_line(self._probe.head)
+        file, offset = self._sources.place(place)
+        return describe(file, offset, line, frame) if line else ""
+
+    def _text_hints(self, fault: str) -> list[str]:
+        """What is good to know of the lines of a text."""
+        found = []
+        if self._scanner.others:
+            found.append(f"{self._scanner.others} lines of another kind were passed over; nothing is missing for them")
+        if self._good and fault:
+            found.append(fault)
+        if self._good and self._cut_line is not None:
+            file, offset = self._sources.place(self._cut_line)
+            number = line_number(file, offset)
+            found.append(f"line {number} of {file.name}, the last, has no line end and may be cut: it is left out")
+        return found
 
     def _hints(self, seen: Probe) -> list[str]:
         found = [f"the compressed data of {file.name} break off" for file in self._sources.files if file.cut_short]
@@ -184,6 +223,8 @@ class DumpReader:
         hints = self._hints(self._probe)
         if hints:
             return hints[-1]
+        if isinstance(self.board.layout, TextFrame):
+            return f"mend `frame` in the file of board {self.board.name} (prefix, separator, fields), or `board`"
         return "check that `board` and its frame layout are right, and that the logger stored raw bytes"
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -33,6 +35,24 @@ class Content(NamedTuple):
         return np.lib.stride_tricks.sliding_window_view(self.buffer, self.length)[self.places]
 
 
+@dataclass
+class Hole:
+    """Damaged lines between two good ones of a text: bytes from first to last, in so many lines, and the worst."""
+
+    first: int = 0
+    last: int = 0
+    lines: int = 0
+    worst: int = NO_SYNC
+
+    def add(self, start: int, stop: int, lines: int, damage: int) -> None:
+        """Note damaged bytes [start, stop), as many as `lines` lines."""
+        self.first = self.first if self.lines else start
+        self.last, self.lines, self.worst = stop, self.lines + lines, max(self.worst, damage)
+
+
+NO_HOLES: Mapping[int, Hole] = MappingProxyType({})
+
+
 class Found(NamedTuple):
     """Good frames of one chunk, in order.
 
@@ -42,6 +62,7 @@ class Found(NamedTuple):
     counter     : int64 [n] as sent, or None;  stamp : int64 [n] as sent, or None
     channels    : channel → [n], all but the raw counter
     breaks      : rows that do not begin where the one before ends, or whose counter does not follow, and row 0
+    holes       : text: row → the damaged lines before it, where they are and how many
     """
 
     start: np.ndarray
@@ -52,6 +73,7 @@ class Found(NamedTuple):
     stamp: np.ndarray | None
     channels: dict[str, np.ndarray]
     breaks: np.ndarray
+    holes: Mapping[int, Hole] = NO_HOLES
 
     def take(self, index: np.ndarray, rule: CounterRule | None) -> Found:
         """The frames of an index or a mask."""
@@ -71,18 +93,24 @@ class Found(NamedTuple):
 
 class Tail(NamedTuple):
     """What follows the last good frame: [start, stop) of the stream, the worst thing seen there, and whether a frame
-    breaks off at the end."""
+    breaks off at the end. lines : damaged ones, of text."""
 
     start: int
     stop: int
     damage: int
     broken_off: bool
+    lines: int | None = None
 
 
 class Scanner(Protocol):
-    """Good frames of a stream, chunk by chunk; `tail` is right after the last one."""
+    """Good frames of a stream, chunk by chunk; `tail` is right after the last one.
+
+    others  : lines of another kind so far;  refused : place and text of the first damaged line; both of text alone
+    """
 
     typical_length: float
+    others: int
+    refused: tuple[int, bytes] | None
 
     def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
         """Take the next bytes; return the frames that are certain by now."""
@@ -98,6 +126,8 @@ class BinaryScanner:
     board: Board
     engine: str = "native"
     typical_length: float = 0
+    others: int = 0
+    refused: tuple[int, bytes] | None = None
     _buffer: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
     _base: int = 0
     _done: int = 0  # end of the last frame that was given out

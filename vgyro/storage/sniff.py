@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vgyro.board import BinaryFrame, Board
+from vgyro.board import BinaryFrame, Board, TextFrame
 from vgyro.errors import ConfigError, DataError
 from vgyro.storage.inputs import BOARDS, read_board
 from vgyro.storage.scan import BinaryScanner, Found, Scanner
 from vgyro.storage.selection import CounterRule
 from vgyro.storage.sources import Sources, open_sources
+from vgyro.storage.textform import recurring_forms, typical_line
 from vgyro.storage.textscan import TextScanner
 
 PROBE_BYTES = 1 << 20
@@ -29,6 +30,8 @@ class Probe(NamedTuple):
     period_ticks   : median step of the time stamp between frames in step; None without
     typical_length : bytes of a frame (a line with its end)
     counter_step   : the commonest step of the counter between adjacent frames; None without
+    forms          : text: what lines of another kind look like
+    head           : the bytes that were looked at
     """
 
     frames: int
@@ -36,6 +39,8 @@ class Probe(NamedTuple):
     period_ticks: float | None
     typical_length: float
     counter_step: int | None
+    forms: frozenset[bytes] = frozenset()
+    head: bytes = b""
 
 
 class Sniffed(NamedTuple):
@@ -47,11 +52,11 @@ class Sniffed(NamedTuple):
     rate_hz: float | None
 
 
-def scanner_of(board: Board, typical_length: float = 0, engine: str = "native") -> Scanner:
-    """The scanner for a board's frames. engine : of the search for binary ones"""
+def scanner_of(board: Board, typical_length: float = 0, engine: str = "native", forms: Iterable[bytes] = ()) -> Scanner:
+    """The scanner for a board's frames. engine : of the search for binary ones;  forms : of other lines, of text"""
     if isinstance(board.layout, BinaryFrame):
         return BinaryScanner(board, engine)
-    return TextScanner(board, typical_length)
+    return TextScanner(board, typical_length, forms)
 
 
 def probe(sources: Sources, board: Board) -> Probe:
@@ -62,14 +67,27 @@ def probe(sources: Sources, board: Board) -> Probe:
         head += block
         if len(head) >= PROBE_BYTES:
             break
+    head = head[:PROBE_BYTES]
+    if isinstance(board.layout, TextFrame):
+        return _probe_text(head, board, board.layout)
     scanner = scanner_of(board)
-    found = scanner.feed(head[:PROBE_BYTES], last=True)
-    count = len(found.start)
-    share = float((found.stop - found.start).sum()) / len(head) if len(head) else 0.0
-    length = scanner.typical_length
-    if count and not isinstance(board.layout, BinaryFrame):
-        length = float(np.median(found.stop - found.start)) + LINE_END
-    return Probe(count, min(1.0, share), _period(found, board), length, _counter_step(found))
+    found = scanner.feed(head, last=True)
+    share = float((found.stop - found.start).sum()) / len(head) if head else 0.0
+    step = _counter_step(found)
+    return Probe(
+        len(found.start), min(1.0, share), _period(found, board), scanner.typical_length, step, frozenset(), head
+    )
+
+
+def _probe_text(head: bytes, board: Board, frame: TextFrame) -> Probe:
+    forms = recurring_forms(head, frame)
+    scanner = TextScanner(board, typical_line(head) + LINE_END, forms)
+    found = scanner.feed(head, last=True)
+    count, length = len(found.start), scanner.typical_length
+    if count:
+        length = scanner.good_bytes / count + LINE_END
+    share = count * length / len(head) if head else 0.0
+    return Probe(count, min(1.0, share), _period(found, board), length, _counter_step(found), forms, head)
 
 
 def _period(found: Found, board: Board) -> float | None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import re
+from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,27 +13,50 @@ import pyarrow as pa
 import pyarrow.csv
 
 from vgyro.board import Board, TextFrame
-from vgyro.engine.frames import DTYPES
 from vgyro.storage.layout import channel_types, kept_channels
-from vgyro.storage.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Content, Found, Tail
+from vgyro.storage.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Content, Found, Hole, Tail
 from vgyro.storage.selection import CounterRule, breaks_of
+from vgyro.storage.textform import (
+    BLANK,
+    Kinds,
+    first_is_whole,
+    line_pattern,
+    opening,
+    readable,
+    separator_pattern,
+    type_limits,
+)
 
-BLANK = b"\r\n \t\0"
 NEWLINE = b"\n"
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+LONGEST_LINE = 4096  # of another kind; what goes on longer is damage
+FIRST_LINES = 16  # the first line is judged by so many after it …
+FIRST_BYTES = 1 << 16  # … as far as they come within so many bytes
+SAME_WIDTHS = 8  # so many last fields of one width, and that of an unfinished line is whole if it has it, too
 
 
 @dataclass
 class TextScanner:
-    """Lines of the right form, XOR and range. A line that lost its end is still read, where it has a checksum."""
+    """Lines of the right form, XOR and range. A line that lost its end is still read, where it has a checksum.
+
+    others : lines of another kind so far;  good_bytes : bytes of good lines so far, without their ends
+    refused : place and text of the first line that is damaged, None so far
+    """
 
     board: Board
     typical_length: float = 0
+    forms: Iterable[bytes] = ()
+    others: int = 0
+    good_bytes: int = 0
+    refused: tuple[int, bytes] | None = None
     _buffer: bytes = b""
     _base: int = 0
-    _done: int = 0
-    _damage: int = NO_SYNC
-    _held: tuple[bytes, int, int] | None = None  # the first line of a text without checksum
+    _done: int = 0  # end of the last good line
+    _judged: int = 0  # what lies before is known to be good, damage or other
+    _hole: Hole = field(default_factory=Hole)
+    _first_open: bool = False  # the first line is not judged yet
     _fresh: bool = True
+    _widths: deque[int] = field(default_factory=lambda: deque(maxlen=SAME_WIDTHS))
     _tail: Tail = field(default=Tail(0, 0, NO_SYNC, False))
 
     def __post_init__(self) -> None:
@@ -40,7 +65,11 @@ class TextScanner:
             raise TypeError(f"board {self.board.name!r} sends binary frames")
         self._frame = frame
         self._pattern = re.compile(line_pattern(frame))
+        self._separator = re.compile(separator_pattern(frame))
+        self._kinds = Kinds(frame, self.forms)
         self._types = channel_types(frame)
+        # Without a checksum and a prefix the first line may have lost its beginning and not show it.
+        self._first_open = frame.checksum.family == "none" and not opening(frame)
         self.typical_length = self.typical_length or float(len(frame.prefix) + 4 * len(self._types))
 
     def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
@@ -50,18 +79,18 @@ class TextScanner:
             self._buffer, self._base = NEWLINE, -1
         self._fresh = False
         self._buffer += data
-        complete = self._buffer
-        if last and self._ends_certainly():
-            complete += NEWLINE
-        texts, start, stop, bad = self._lines(complete)
-        texts, start, stop = self._without_cut_first(texts, start, stop, last)
-        found = self._found(texts, start, stop, bad)
+        if self._base <= 0 and self._buffer[-self._base :].startswith(BYTE_ORDER_MARK):
+            self._buffer = self._buffer.replace(BYTE_ORDER_MARK, b"   ", 1)
+        complete = self._buffer + NEWLINE if last and self._ends_whole() else self._buffer
+        texts, start, stop = self._lines(complete)
         end = self._base + len(self._buffer)
+        if self._first_open:
+            if not self._first_can_be_judged(start, end, last):
+                return self._found([], start[:0], stop[:0], self._judged)
+            texts, start, stop = self._without_cut_first(texts, start, stop)
+        found = self._found(texts, start, stop, end)
         if last:
-            rest = self._between(self._done, end)
-            worst = max(self._damage, BAD_CHECKSUM if self._seems_a_line(rest) else NO_SYNC)
-            stop_here = self._done if not rest.strip(BLANK) else end
-            self._tail = Tail(self._done, stop_here, worst, bool(rest.strip(BLANK)) and not rest.endswith(NEWLINE))
+            self._finish(end)
         self._keep(end)
         return found
 
@@ -69,13 +98,23 @@ class TextScanner:
         """What follows the last good line, after feed(last=True)."""
         return self._tail
 
-    def _ends_certainly(self) -> bool:
+    def _ends_whole(self) -> bool:
         """True if the form of a line shows that nothing is missing at its end."""
-        last_field = self._frame.fields[-1].channels()[-1]
-        return self._frame.checksum.family == "xor" or last_field in self._frame.require
+        if self._frame.checksum.family == "xor":
+            return True
+        entry = self._frame.fields[-1]
+        if entry.channels()[-1] in self._frame.require or entry.decimals is not None:
+            return True
+        rest = re.split(rb"[\r\n]", self._buffer)[-1].strip(BLANK)
+        fresh = (len(self._fields(match[1])[-1]) for match in self._pattern.finditer(self._buffer))
+        widths = [*self._widths, *fresh][-SAME_WIDTHS:]
+        return len(widths) == SAME_WIDTHS and {len(self._fields(rest)[-1])} == set(widths)
 
-    def _lines(self, text: bytes) -> tuple[list[bytes], np.ndarray, np.ndarray, np.ndarray]:
-        """Fields, start and stop of the good lines, and places of bad ones."""
+    def _fields(self, text: bytes) -> list[bytes]:
+        return self._separator.split(text)
+
+    def _lines(self, text: bytes) -> tuple[list[bytes], np.ndarray, np.ndarray]:
+        """Fields, start and stop of the lines of the right form and XOR."""
         matches = [m for m in self._pattern.finditer(text) if m.end(1) - m.start(1) <= self._frame.max_length]
         start = np.array([m.start() for m in matches], dtype=np.int64) + self._base
         stop = np.array([m.end() for m in matches], dtype=np.int64) + self._base
@@ -87,56 +126,65 @@ class TextScanner:
             star = np.array([m.start(2) - 1 for m in matches])
             good = xor_of(text, first, star) == stated
         kept = np.flatnonzero(good)
-        return [texts[i] for i in kept], start[kept], stop[kept], start[~good]
+        return [texts[i] for i in kept], start[kept], stop[kept]
+
+    def _first_can_be_judged(self, start: np.ndarray, end: int, last: bool) -> bool:
+        if not len(start):
+            # A first line without its end may still become one.
+            return last or end > FIRST_BYTES or len(re.split(rb"[\r\n]", self._buffer.strip(BLANK))) > 1
+        return bool(start[0] > 0) or last or end > FIRST_BYTES or len(start) > FIRST_LINES
 
     def _without_cut_first(
-        self, texts: list[bytes], start: np.ndarray, stop: np.ndarray, last: bool
+        self, texts: list[bytes], start: np.ndarray, stop: np.ndarray
     ) -> tuple[list[bytes], np.ndarray, np.ndarray]:
-        """Without a checksum the first line of a stream may have lost its beginning and not show it.
-
-        It is taken if it has as many digits as the line after it.
-        """
-        if self._frame.checksum.family != "none":
+        """The lines without the stream's first if that may have lost its beginning."""
+        self._first_open = False
+        if not len(start) or start[0] > 0:
             return texts, start, stop
-        if self._held is not None:
-            # It is still in the buffer, and is found again.
-            after = start >= self._held[2]
-            texts = [self._held[0], *(text for text, later in zip(texts, after, strict=True) if later)]
-            start, stop = np.insert(start[after], 0, self._held[1]), np.insert(stop[after], 0, self._held[2])
-            self._held = None
-        elif not len(start) or start[0] > 0:
-            return texts, start, stop
-        if len(texts) == 1 and not last:
-            self._held = (texts[0], int(start[0]), int(stop[0]))
-            return [], start[:0], stop[:0]
-        if len(texts) == 1 or _digits(texts[0]) == _digits(texts[1]):
+        first, *after = [
+            self._fields(text)[0]
+            for text, place in zip(texts[: FIRST_LINES + 1], stop.tolist(), strict=False)
+            if place <= FIRST_BYTES
+        ]
+        if first_is_whole(first, after, self.board):
             return texts, start, stop
         return texts[1:], start[1:], stop[1:]
 
-    def _found(self, texts: list[bytes], start: np.ndarray, stop: np.ndarray, bad: np.ndarray) -> Found:
+    def _found(self, texts: list[bytes], start: np.ndarray, stop: np.ndarray, end: int) -> Found:
+        """The frames of the lines; what lies between them and up to `end` is judged as far as its lines are whole."""
         values, fits = self._values(texts)
         valid = np.ones(len(texts), dtype=bool)
         for name, value in self._frame.require.items():
             valid &= values[name] == value
         good = fits & valid
-        spoilt = np.union1d(bad, start[~fits])
-        invalid = start[fits & ~valid]
+        invalid = set(start[fits & ~valid].tolist())
+        kept = [texts[row] for row in np.flatnonzero(good)[-SAME_WIDTHS:]]
         start, stop = start[good], stop[good]
-        damage = np.zeros(len(start), dtype=np.uint8)
-        done, worst = self._done, self._damage
-        before = np.insert(stop[:-1], 0, done) if len(start) else start
+        self.good_bytes += int((stop - start).sum())
+        self._widths.extend(len(self._fields(text)[-1]) for text in kept)
+        damage, holes = np.zeros(len(start), dtype=np.uint8), {}
+        before = np.insert(stop[:-1], 0, self._judged) if len(start) else start
         # Line ends and padding are nobody's damage.
-        clean = self._blank(before, start)
-        start = np.where(clean, before, start)
-        for index in np.flatnonzero(start > before):
-            begin = int(before[index])
-            between = self._between(begin, int(start[index]))
-            damage[index] = self._worst(begin, int(start[index]), between, spoilt, invalid, worst if index == 0 else 0)
+        dirty = ~self._blank(before, start)
         if len(start):
-            self._done, self._damage = int(stop[-1]), NO_SYNC
-        rest = self._worst(self._done, 1 << 62, b"", spoilt, invalid, self._damage)
-        self._damage = rest
-        values = {name: column[good] for name, column in values.items()}
+            dirty[0] |= self._hole.lines > 0
+        begin = np.insert(stop[:-1], 0, self._done) if len(start) else start
+        real, start = start, begin.copy()
+        for row in np.flatnonzero(dirty).tolist():
+            self._judge(int(before[row]), int(real[row]), invalid)
+            hole, self._hole = self._hole, Hole()
+            if hole.lines:
+                holes[row], damage[row] = hole, hole.worst
+                # As long as the damaged lines would have been; lines of another kind take no room.
+                start[row] += min(round(hole.lines * self.typical_length), int(real[row] - begin[row]))
+        if len(start):
+            self._done = self._judged = int(stop[-1])
+        self._judge(self._judged, end, invalid, whole=False)
+        return self._frames({name: column[good] for name, column in values.items()}, start, stop, damage, holes)
+
+    def _frames(
+        self, values: dict[str, np.ndarray], start: np.ndarray, stop: np.ndarray, damage: np.ndarray, holes: dict
+    ) -> Found:
         raw = np.column_stack([column.astype(np.float64) for column in values.values()])
         content = Content(raw.reshape(-1).view(np.uint8), np.arange(len(raw)) * raw.strides[0], raw.strides[0])
         counter = values[self.board.counter.field].astype(np.int64) if self.board.counter else None
@@ -144,42 +192,76 @@ class TextScanner:
         channels = {name: values[name] for name in kept_channels(self.board)}
         rule = CounterRule(self.board.counter.step, self.board.counter.modulus) if self.board.counter else None
         breaks = breaks_of(start, stop, counter, rule)
-        return Found(start, stop, damage, content, counter, stamp, channels, breaks)
+        return Found(start, stop, damage, content, counter, stamp, channels, breaks, holes)
 
-    def _worst(self, begin: int, end: int, text: bytes, spoilt: np.ndarray, invalid: np.ndarray, known: int) -> int:
-        worst = known
-        if np.any((spoilt >= begin) & (spoilt < end)) or self._seems_a_line(text):
-            worst = max(worst, BAD_CHECKSUM)
-        if np.any((invalid >= begin) & (invalid < end)):
-            worst = max(worst, INVALID)
-        return worst
+    def _judge(self, begin: int, end: int, invalid: set[int], whole: bool = True) -> None:
+        """Sort the lines from begin to end, none of them good, into damaged and other ones.
 
-    def _seems_a_line(self, text: bytes) -> bool:
-        prefix = self._frame.prefix.encode()
-        return prefix in text if prefix else bool(text.strip(BLANK))
+        invalid : places of lines that the board itself marks;  whole : false: the last line may go on after `end`
+        """
+        text, first = self._between(begin, end), max(begin, self._base)
+        lines = [match.span() for match in re.finditer(rb"[^\r\n]+", text)]
+        if begin < first and (not lines or lines[0][0] > 0):
+            # A line that went on so long that the buffer no longer holds any of it.
+            lines.insert(0, (0, 0))
+        for start, stop in lines:
+            place, stop_place = first + start if start else begin, first + stop
+            if not whole and stop_place == end:
+                self._judged = place
+                return
+            marked = bool(invalid) and any(place <= other < stop_place for other in invalid)
+            self._sort(text[start:stop], place, stop_place, marked)
+        if not whole:
+            self._judged = max(begin, end)
+
+    def _sort(self, line: bytes, start: int, stop: int, invalid: bool) -> None:
+        too_long = stop - start > LONGEST_LINE
+        if not line.strip(BLANK) and not too_long:
+            return
+        if not too_long and not invalid and self._kinds.is_other(line):
+            self.others += 1
+            return
+        if self.refused is None and not invalid:
+            self.refused = start, line[:LONGEST_LINE]
+        # Bytes that cannot be text have no lines to be counted.
+        by_form = readable(line) and not too_long
+        lines = self._kinds.count(line) if by_form else max(1, round((stop - start) / self.typical_length))
+        self._hole.add(start, stop, lines, INVALID if invalid else BAD_CHECKSUM)
+
+    def _finish(self, end: int) -> None:
+        """Judge the last line, which has no end, and say what follows the last good one."""
+        rest = self._between(self._judged, end)
+        self._judge(self._judged, end, set())
+        hole = self._hole
+        if not hole.lines:
+            self._tail = Tail(self._done, self._done, NO_SYNC, False)
+            return
+        broken_off = bool(rest.strip(BLANK)) and hole.last == self._judged + len(rest.rstrip(b"\r\n"))
+        self._tail = Tail(hole.first, hole.last, hole.worst, broken_off, hole.lines)
 
     def _values(self, texts: list[bytes]) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Columns of the lines in their declared types, and which lines are within the types' ranges."""
         names = list(self._types)
         if not texts:
             return {name: np.empty(0, dtype=kind) for name, kind in self._types.items()}, np.empty(0, dtype=bool)
-        separator = self._frame.separator
-        lines = [b" ".join(text.split()) for text in texts] if separator == " " else texts
+        separator, whole = self._frame.separator, NEWLINE.join(texts) + NEWLINE
+        if len(separator) != 1 or separator.isspace() or b" " in whole or b"\t" in whole:
+            separator, whole = ",", self._separator.sub(b",", whole)
         kinds = {name: pa.float64() if kind.kind == "f" else pa.int64() for name, kind in self._types.items()}
         table = pa.csv.read_csv(
-            io.BytesIO(NEWLINE.join(lines) + NEWLINE),
+            io.BytesIO(whole),
             read_options=pa.csv.ReadOptions(column_names=names, use_threads=False),
             parse_options=pa.csv.ParseOptions(delimiter=separator, quote_char=False),
             convert_options=pa.csv.ConvertOptions(column_types=kinds, null_values=[]),
         )
         values, fits = {}, np.ones(len(texts), dtype=bool)
-        for name, kind in self._types.items():
-            column = table.column(name).to_numpy()
-            if kind.kind != "f":
-                limits = np.iinfo(kind)
-                # uint64 does not fit into int64: the text form is limited to 2^63 - 1.
-                fits &= (column >= limits.min) & (column <= min(limits.max, np.iinfo(np.int64).max))
-            values[name] = column.astype(kind)
+        for entry in self._frame.fields:
+            for name in entry.channels():
+                column, kind = table.column(name).to_numpy(), self._types[name]
+                if kind.kind != "f":
+                    low, high = type_limits(entry)
+                    fits &= (column >= low) & (column <= high)
+                values[name] = column.astype(kind)
         return values, fits
 
     def _blank(self, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -197,35 +279,14 @@ class TextScanner:
         return self._buffer[max(0, start - self._base) : max(0, stop - self._base)]
 
     def _keep(self, end: int) -> None:
-        """Keep what may still become part of a good line: one line's length, and nothing that is given out."""
-        held = self._held[1] if self._held else end
-        keep_from = min(held, max(self._done - 1, end - 2 * self._frame.max_length, self._base))
-        # The prefix may stand across the border.
-        dropped = self._between(max(self._done, self._base), keep_from + len(self._frame.prefix))
-        if dropped.strip(BLANK) and self._seems_a_line(dropped):
-            self._damage = max(self._damage, BAD_CHECKSUM)
+        """Keep the line that is not whole yet, and the byte before it; of one that goes on too long, the end."""
+        room = LONGEST_LINE + 2 * self._frame.max_length
+        keep_from = max(self._base, self._judged - 1, end - room)
+        if self.refused is None and keep_from > self._judged:
+            # It is damage, whatever follows; here its beginning can still be shown.
+            self.refused = self._judged, self._between(self._judged, self._judged + LONGEST_LINE)
         self._buffer = self._buffer[keep_from - self._base :]
         self._base = keep_from
-
-
-def line_pattern(frame: TextFrame) -> bytes:
-    """Regular expression of a whole line; group 1 holds the fields, group 2 the checksum."""
-    separator = rb"[ \t]+" if frame.separator == " " else re.escape(frame.separator.encode())
-    forms = []
-    for entry in frame.fields:
-        form = rb"-?\d{1,19}"
-        if DTYPES[entry.type].startswith("u"):
-            form = rb"\d{1,19}"
-        elif DTYPES[entry.type].startswith("f"):
-            form = rb"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d{1,3})?"
-            if entry.decimals is not None:
-                form = rb"[+-]?\d+\.\d{%d}" % entry.decimals
-        forms += [form] * entry.count
-    fields = rb"(" + separator.join(forms) + rb")"
-    if frame.checksum.family == "xor":
-        return re.escape(frame.prefix.encode()) + separator + fields + rb"\*([0-9A-Fa-f]{2})"
-    prefix = re.escape(frame.prefix.encode()) + separator if frame.prefix else b""
-    return rb"(?<=[\r\n])[ \t]*" + prefix + fields + rb"[ \t]*(?=[\r\n])"
 
 
 def xor_of(text: bytes, first: np.ndarray, last: np.ndarray) -> np.ndarray:
@@ -233,7 +294,3 @@ def xor_of(text: bytes, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     values = np.frombuffer(text, dtype=np.uint8)
     borders = np.column_stack([first, last]).reshape(-1)
     return np.bitwise_xor.reduceat(values, borders)[::2]
-
-
-def _digits(text: bytes) -> int:
-    return len(text.split()[0].lstrip(b"+-").split(b".")[0])
