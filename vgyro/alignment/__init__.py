@@ -1,0 +1,33 @@
+"""Gyros of several clocks on one time, and delays between the gyros of one board, from the motion they have in common."""
+
+from vgyro.alignment.clock import (
+    AMBIGUOUS,
+    FOUND,
+    NO_COMMON_MOTION,
+    STATUSES,
+    TOO_SHORT,
+    ClockFit,
+    Evidence,
+    refuse_clock,
+    relative_clock,
+)
+from vgyro.alignment.interpolation import interpolate, noise_gain
+from vgyro.alignment.streams import Stream, positions, resample, stretches
+
+__all__ = [
+    "AMBIGUOUS",
+    "FOUND",
+    "NO_COMMON_MOTION",
+    "STATUSES",
+    "TOO_SHORT",
+    "ClockFit",
+    "Evidence",
+    "Stream",
+    "interpolate",
+    "noise_gain",
+    "positions",
+    "refuse_clock",
+    "relative_clock",
+    "resample",
+    "stretches",
+]
