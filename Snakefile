@@ -28,6 +28,7 @@ wildcard_constraints:
 
 localrules:
     all,
+    one,
     papers,
 
 
@@ -36,6 +37,12 @@ rule all:
         everything,
         "reports/index.html",
         "results/verdict.json",
+
+
+rule one:
+    """Everything of the data set that `--config only=NAME` names; see `vgyro run`."""
+    input:
+        everything_of_one,
 
 
 rule papers:
@@ -53,6 +60,11 @@ include: "workflow/rules/measure.smk"
 include: "workflow/rules/more_gyros.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/papers.smk"
+
+
+onsuccess:
+    for page in pages_made():
+        print(f"report: {page}")
 
 
 onerror:

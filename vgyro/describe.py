@@ -100,7 +100,7 @@ def value_text(value: Any) -> str:
     """A default as it is written in YAML, on one line."""
     if isinstance(value, tuple):
         value = list(value)
-    text = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=WIDTH * 10)
+    text = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=WIDTH * 10, sort_keys=False)
     return text.removesuffix("\n").removesuffix("\n...")
 
 

@@ -17,7 +17,8 @@ from vgyro import __version__
 from vgyro.errors import UsageError, VgyroError
 
 COMMANDS = {
-    "new-dataset": "sniff dumps or Parquet logs and write a commented raw/<name>/dataset.yaml",
+    "run": "from files to the page in one command",
+    "new-dataset": "look at dumps or logs and write a commented raw/<name>/dataset.yaml",
     "check": "validate config.yaml, boards and data sets; every mistake at once",
     "decode": "decode dumps of a board and say how complete they are",
     "simulate": "make a data set from a twin: dumps, manifest, and the truth beside them",
@@ -38,7 +39,9 @@ exit codes (all commands):
  70  a bug in vgyro
 """
 EXAMPLES = """\
-from dumps to a report:
+from a log to a report:
+  vgyro run ~/logs/imu.csv
+from dumps to a report, step by step:
   vgyro new-dataset ~/dumps/*.bin --name bench --board dsp6
   vgyro check
   snakemake --cores 2

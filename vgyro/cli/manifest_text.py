@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from vgyro.dataset import Kind, Manifest, Recording
 from vgyro.describe import type_text, value_text
-from vgyro.log import Log as ParquetLog
+from vgyro.log import Log, LogGyro, LogTime
 
 WIDTH = 120
 
@@ -29,37 +30,69 @@ ANALYSIS = """\
 """
 
 
-@dataclass(frozen=True)
-class LogDraft:
-    """What is known of a Parquet log.
+@dataclass
+class ArrayDraft:
+    """The gyros of logs, as keys of `array`.
 
-    columns : channel or gyro of the board → column, where they are known;  missing : gyros without a column
-    there   : all columns of the log;  time : the column that looks like a time in s
-    values  : counts where the columns hold whole numbers
+    places : channel → where it stands, where a column's name alone does not tell;  why : gyro → how its unit is known
+    other  : column → what it is taken for, and not used
     """
 
-    columns: dict[str, str]
-    missing: list[str]
+    gyros: list[dict[str, Any]] = field(default_factory=list)
+    temperatures: list[dict[str, Any]] = field(default_factory=list)
+    places: dict[str, dict[str, Any]] = field(default_factory=dict)
+    why: dict[str, str] = field(default_factory=dict)
+    other: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class LogDraft:
+    """How a log is to be read.
+
+    time   : name of the column;  time_unit : of its numbers;  meaning : what its stamps were found to be
+    places : channel → Place, where names differ;  there : all columns;  form : phrases on the form of the text
+    values : of a board's columns: counts, or rates in deg/s;  missing : gyros of the board without a column
+    unused : tables with gyros that were not taken
+    """
+
+    family: str
     there: list[str]
-    time: str | None
-    values: str = "counts"
+    time: str | None = None
+    time_unit: str | None = None
+    meaning: str = ""
+    table: str | None = None
+    places: dict[str, Any] = field(default_factory=dict)
+    form: list[str] = field(default_factory=list)
+    values: str | None = None
+    missing: list[str] = field(default_factory=list)
+    unused: list[str] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
+@dataclass
 class RecordingDraft:
-    """One recording to be: its file, what was measured, and notes for the user."""
+    """One recording to be: its files, what was measured, and notes for the user."""
 
     name: str
-    file: str
+    files: list[str]
     kind: Kind = "static"
+    why: str = "a guess: correct it"
     rate_hz: float | None = None
     notes: list[str] = field(default_factory=list)
     log: LogDraft | None = None
 
 
-def manifest_text(board: str, board_notes: list[str], folder: str, recordings: list[RecordingDraft]) -> str:
-    """The text of a dataset.yaml; the first recording explains every key, the others only hold what differs."""
-    lines = [HEAD, "\n", *_key(Manifest, "board", board, notes=board_notes)]
+def manifest_text(
+    board: str | ArrayDraft, board_notes: list[str], folder: str, recordings: Sequence[RecordingDraft]
+) -> str:
+    """The text of a dataset.yaml; the first recording explains every key, the others only hold what differs.
+
+    board : name of a board file, or the gyros that the manifest names itself
+    """
+    lines = [HEAD, "\n"]
+    if isinstance(board, ArrayDraft):
+        lines += [*_array(board), "\n", *_key(Manifest, "board", None)]
+    else:
+        lines += [*_key(Manifest, "board", board, notes=board_notes), "\n", *_key(Manifest, "array", None)]
     for name in ("title", "folder", "gyros", "latitude_deg", "simulated", "twin", "notes"):
         lines += ["\n", *_key(Manifest, name, folder if name == "folder" else None)]
     lines.append(f"\n# {Manifest.model_fields['recordings'].description}\nrecordings:\n")
@@ -67,6 +100,22 @@ def manifest_text(board: str, board_notes: list[str], folder: str, recordings: l
         lines += _recording(draft, explained=index == 0)
     lines.append(f"\n# {Manifest.model_fields['analysis'].description}\n{ANALYSIS}")
     return "".join(lines)
+
+
+def _array(array: ArrayDraft) -> Iterator[str]:
+    fields = LogGyro.model_fields
+    yield f"# {Manifest.model_fields['array'].description}; keys of a gyro:\n"
+    for name in ("column", "axis", "sign", "unit", "scale", "bias", "range_deg_s"):
+        yield f"#   {name}: {fields[name].description}\n"
+    yield "array:\n  gyros:\n"
+    for gyro in array.gyros:
+        yield f"    - {value_text(gyro)}  # {array.why[gyro['name']]}\n"
+    yield "  # thermometers: °C = value · scale + offset\n"
+    yield f"  temperatures:{'' if array.temperatures else ' []'}\n"
+    yield from (f"    - {value_text(one)}\n" for one in array.temperatures)
+    if array.other:
+        yield "  # not used:\n"
+        yield from (f"  #   {column}: {what}\n" for column, what in array.other.items())
 
 
 def _key(
@@ -87,15 +136,15 @@ def _recording(draft: RecordingDraft, explained: bool) -> Iterator[str]:
     if not explained:
         yield f"\n  - name: {value_text(draft.name)}\n"
         yield from (f"{indent}# {note}\n" for note in draft.notes)
-        yield f"{indent}kind: {draft.kind}\n{indent}files: {value_text([draft.file])}\n"
+        yield f"{indent}# {draft.why}\n{indent}kind: {draft.kind}\n{indent}files: {value_text(draft.files)}\n"
         if draft.rate_hz is not None:
             yield f"{indent}rate_hz: {value_text(draft.rate_hz)}\n"
         yield from _log(draft.log, indent)
         return
     yield f"  # {Recording.model_fields['name'].description}\n  - name: {value_text(draft.name)}\n"
     yield from (f"{indent}# {note}\n" for note in draft.notes)
-    yield from _key(Recording, "kind", draft.kind, indent, ["a guess: correct it"])
-    yield from _key(Recording, "files", [draft.file], indent)
+    yield from _key(Recording, "kind", draft.kind, indent, [draft.why])
+    yield from _key(Recording, "files", draft.files, indent)
     yield from _key(Recording, "rate_hz", draft.rate_hz, indent)
     yield from _key(Recording, "rest", None, indent)
     yield from _key(Recording, "axis", None, indent)
@@ -108,20 +157,30 @@ def _recording(draft: RecordingDraft, explained: bool) -> Iterator[str]:
 def _log(log: LogDraft | None, indent: str) -> Iterator[str]:
     if log is None:
         return
-    fields = ParquetLog.model_fields
-    yield f"{indent}# {Recording.model_fields['parquet'].description}; the log has the columns\n"
+    fields, inner = Log.model_fields, f"{indent}  "
+    form = f" ({', '.join(log.form)})" if log.form else ""
+    yield f"{indent}# {Recording.model_fields['log'].description}\n"
+    yield f"{indent}# it has the columns{form}\n"
     yield from (f"{indent}#   {line}\n" for line in _wrapped(log.there, WIDTH - len(indent) - 4))
-    yield f"{indent}log:\n"
-    kind = "floating-point" if log.values == "rates" else "whole"
-    yield f"{indent}  # {fields['values'].description}; a guess, for the columns hold {kind} numbers\n"
-    yield f"{indent}  values: {log.values}\n"
-    yield f"{indent}  # {fields['time'].description}\n"
-    yield f"{indent}  {'' if log.time else '# '}time: {value_text(log.time)}\n"
-    yield f"{indent}  # {fields['columns'].description}; only where the names differ\n"
-    differing = {name: column for name, column in log.columns.items() if name != column}
-    yield f"{indent}  columns:{'' if differing else ' {}'}\n"
-    yield from (f"{indent}    {name}: {value_text(column)}\n" for name, column in differing.items())
-    yield from (f"{indent}    # {name}: no column found\n" for name in log.missing)
+    yield f"{indent}log:\n{inner}family: {log.family}\n"
+    if log.table is not None:
+        others = f"; others with gyros: {', '.join(log.unused)}" if log.unused else ""
+        yield f"{inner}# {fields['table'].description}{others}\n{inner}table: {value_text(log.table)}\n"
+    yield f"{inner}# {fields['time'].description}\n"
+    if log.time is None:
+        yield f"{inner}time: null\n"
+    else:
+        stamp: dict[str, str] = {"column": log.time} | ({"unit": log.time_unit} if log.time_unit else {})
+        yield f"{inner}# meaning: {LogTime.model_fields['meaning'].description}; {log.meaning or 'found when it is read'}\n"
+        yield f"{inner}time: {value_text(stamp)}\n"
+    if log.values is not None:
+        kind = "floating-point" if log.values == "rates" else "whole"
+        yield f"{inner}# {fields['values'].description}; a guess, for the columns hold {kind} numbers\n"
+        yield f"{inner}values: {log.values}\n"
+    yield f"{inner}# {fields['columns'].description}; only where the names differ\n"
+    yield f"{inner}columns:{'' if log.places else ' {}'}\n"
+    yield from (f"{inner}  {name}: {value_text(place)}\n" for name, place in log.places.items())
+    yield from (f"{inner}  # {name}: no column found\n" for name in log.missing)
 
 
 def _wrapped(words: list[str], width: int) -> Iterator[str]:

@@ -1,7 +1,8 @@
-"""Sniff dumps or Parquet logs and write a commented raw/<name>/dataset.yaml for them.
+"""Look at dumps or logs and write a commented raw/<name>/dataset.yaml for them.
 
-Each file (or folder of Parquet files) becomes one recording, of kind static until you say otherwise. The files stay
-where they are. An existing dataset.yaml is never overwritten.
+A log is any file of a table with columns: text (CSV and all its kin), Parquet, PX4 ULog, ROS 1 or 2 bag, MCAP, NumPy,
+MATLAB. Prints what it took for what, and why; asks nothing. Each file (or folder of logs) becomes one recording, unless
+several hold one gyro each of one array. The files stay where they are. An existing dataset.yaml is never overwritten.
 """
 
 from __future__ import annotations
@@ -10,77 +11,131 @@ import argparse
 import json
 import os
 import re
+from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vgyro.board import Board
-    from vgyro.cli.manifest_text import LogDraft, RecordingDraft
+    from vgyro.cli.found import Found
+    from vgyro.cli.manifest_text import RecordingDraft
 
 EPILOG = """\
 examples:
   vgyro new-dataset ~/dumps/*.bin
-  vgyro new-dataset ~/dumps/a.bin ~/dumps/b.bin.gz --name bench --board dsp6
-  vgyro new-dataset /archive/2026-02 --name winter --board adis16405     a folder of Parquet files
+  vgyro new-dataset ~/logs/imu.csv --name bench
+  vgyro new-dataset counts.csv --scale 1/131              counts, 131 a deg/s
+  vgyro new-dataset print.txt --rate 100                  a log without time stamps
+  vgyro new-dataset one.csv two.csv three.csv --together  three boards with a gyro each: one array
+  vgyro new-dataset /archive/2026-02 --name winter --board adis16405     a folder of logs
 
 exit codes:
   0  written
-  2  the data set exists already, or its name cannot be used
+  2  the data set exists already, its name cannot be used, or an option is needed that the files do not tell
   3  there is no such board
-  4  a file is not there, is empty, or fits no board
+  4  a file is not there, is empty, or cannot be read
 """
-ENDINGS = (".gz", ".zst", ".parquet", ".bin", ".dat", ".txt", ".log", ".raw", ".csv")
+ENDINGS = (
+    ".gz", ".zst", ".parquet", ".bin", ".dat", ".txt", ".log", ".raw", ".csv", ".tsv", ".ulg", ".ulog", ".bag", ".mcap",
+    ".db3", ".npy", ".npz", ".mat", ".json", ".jsonl",
+)  # fmt: skip
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("files", nargs="+", metavar="FILE", type=Path, help="dump (.gz and .zst too), or Parquet log")
+def add_arguments(parser: argparse.ArgumentParser, files: str = "+") -> None:
+    """Declare the arguments. files : how many"""
+    what = "dump or log (.gz and .zst too), or a folder of logs"
+    parser.add_argument("files", nargs=files, metavar="FILE", type=Path, help=what)
     parser.add_argument("--name", help="name of the data set; default: that of the files' folder")
-    parser.add_argument("--board", help="board in config/boards; default: the one that fits best")
+    parser.add_argument("--board", help="board in config/boards, or path of a board file; default: the one that fits best")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second, for files without time stamps")
+    parser.add_argument("--scale", type=_ratio, metavar="DEG_S", help="deg/s a count of a log's gyros: 0.00875, or 1/131")
+    parser.add_argument("--unit", choices=("deg/s", "rad/s", "mdps", "deg/h"), help="unit of a log's gyros")
+    parser.add_argument("--axis", metavar="NAME", help="axis of all gyros of a log; default: by their names, else z")
+    both = parser.add_mutually_exclusive_group()
+    both.add_argument(
+        "--together", action="store_true", default=None, help="the files are one array, read by a clock each"
+    )
+    both.add_argument(
+        "--separate", action="store_false", dest="together", help="the files are recordings of their own"
+    )
+    parser.add_argument("--kind", help="kind of every recording; default: static or free, as the gyros move")
     parser.add_argument("--raw", type=Path, default=Path("raw"), help="default: %(default)s")
     parser.add_argument("--boards", type=Path, default=Path("config/boards"), help="default: %(default)s")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Sniff, write, return the exit code."""
-    from vgyro.cli.manifest_text import manifest_text
-    from vgyro.dataset import check_against_board, parse_manifest
-    from vgyro.storage.inputs import read_board
-    from vgyro.storage.tables import write_text
-
-    target = _target(options)
-    for path in options.files:
-        _must_exist(path)
-    board = read_board(options.board, boards=options.boards) if options.board else None
-    board, notes = (board, ["given on the command line"]) if board else _guess_board(options.files, options.boards)
-    folder = Path(os.path.commonpath([path.resolve().parent for path in options.files]))
-    names: set[str] = set()
-    drafts = [_draft(path, folder, board, names) for path in options.files]
-    text = manifest_text(board.name, notes, _folder_text(folder, target.parent), drafts)
-    manifest = parse_manifest(text, str(target))
-    assert not check_against_board(manifest, board, str(target))
-    write_text(target, text)
+    """Look, write, return the exit code."""
+    target, found = write(options)
     if options.json:
-        recordings = [{"name": draft.name, "file": draft.file, "rate_hz": draft.rate_hz} for draft in drafts]
-        record = {"manifest": str(target), "board": board.name, "recordings": recordings, "notes": notes}
+        record = {
+            "manifest": str(target),
+            "board": found.board_name,
+            "recordings": [
+                {"name": one.name, "files": one.files, "kind": one.kind, "rate_hz": one.rate_hz} for one in found.drafts
+            ],
+            "notes": found.notes,
+        }
         print(json.dumps(record, indent=1, ensure_ascii=False))
     else:
-        runs = "1 recording" if len(drafts) == 1 else f"{len(drafts)} recordings"
-        print(f"{target}: board {board.name} ({notes[0]}), {runs}")
-        print("next: correct the kind of each recording in it, then vgyro check, then snakemake --cores 2")
+        print("\n".join(found.lines))
+        print(f"wrote {target}")
+        print("next: correct what is wrong in it, then vgyro check, then snakemake --cores 2")
     return 0
 
 
-def _target(options: argparse.Namespace) -> Path:
+def write(options: argparse.Namespace) -> tuple[Path, Found]:
+    """Look at the files and write the manifest.  returns : its path, and what was found"""
+    from vgyro.cli.found import find
+    from vgyro.cli.manifest_text import manifest_text
+    from vgyro.dataset import check_against_board, parse_manifest
+    from vgyro.storage.tables import write_text
+
+    target = target_of(options)
+    for path in options.files:
+        _must_exist(path)
+    folder = Path(os.path.commonpath([path.resolve().parent for path in options.files]))
+    found = find(options, folder, target.parent, recording_names(options.files))
+    text = manifest_text(found.board, found.notes, folder_text(folder, target.parent), found.drafts)
+    manifest = parse_manifest(text, str(target))
+    problems = check_against_board(manifest, found.used_board, str(target))
+    if problems:
+        raise AssertionError(f"new-dataset wrote what check refuses: {problems}")
+    write_text(target, text)
+    return target, found
+
+
+def _ratio(text: str) -> float:
+    """A positive number, also as a fraction.  raises : ArgumentTypeError"""
+    try:
+        value = float(Fraction(text.replace(" ", ""))) if "/" not in text else _divided(text)
+    except (ValueError, ZeroDivisionError):
+        raise argparse.ArgumentTypeError(f"expected a number such as 0.00875 or 1/131, found {text!r}") from None
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f"expected a number greater than 0, found {text!r}")
+    return value
+
+
+def _divided(text: str) -> float:
+    over, under = text.split("/")
+    return float(Fraction(over.strip()) / Fraction(under.strip()))
+
+
+def target_of(options: argparse.Namespace, must_exist: bool = False) -> Path:
+    """Path of the manifest to write; must_exist: of one that is there.  raises : UsageError"""
     from vgyro.errors import UsageError
     from vgyro.tasks.inputs_check import DATASET_NAME, MANIFEST, RESERVED
 
-    name = options.name or _identifier(options.files[0].resolve().parent.name)
+    name = options.name or identifier(options.files[0].resolve().parent.name)
     if not DATASET_NAME.fullmatch(name) or name in RESERVED:
         what = f"{name!r} cannot be the name of a data set"
         raise UsageError(what, None, f"give letters, digits, - and _ by --name, and none of {', '.join(RESERVED)}")
     target = options.raw / name / MANIFEST
+    if must_exist:
+        if not target.is_file():
+            raise UsageError("there is no such data set", str(target), "name its files, too")
+        return target
     if target.exists():
         raise UsageError("it exists already, and is not overwritten", str(target), "give another --name, or edit it")
     return target
@@ -88,66 +143,33 @@ def _target(options: argparse.Namespace) -> Path:
 
 def _must_exist(path: Path) -> None:
     from vgyro.errors import DataError
+    from vgyro.storage.sources import check_exists
 
-    if not path.exists():
-        raise DataError("no such file", str(path), "check the path")
-    if path.is_dir() and not any(path.rglob("*.parquet")):
-        raise DataError("a folder without Parquet files", str(path), "name the dumps in it one by one")
-
-
-def _guess_board(files: list[Path], boards: Path) -> tuple[Board, list[str]]:
-    """The board that fits every file best, and why.  raises : DataError where there is none"""
-    from vgyro.cli.sniffing import best_board
-    from vgyro.errors import DataError
-
-    guesses: dict[str, tuple[Board, list[str]]] = {}
-    for path in files:
-        board, notes = best_board(path, boards)
-        guesses.setdefault(board.name, (board, notes))
-        if len(guesses) > 1:
-            what = f"the files come from different boards: {' and '.join(guesses)}"
-            raise DataError(what, str(path), "make one data set a board, or name the board by --board")
-    return next(iter(guesses.values()))
+    check_exists(path)
+    if path.is_dir() and not any(one.is_file() for one in path.rglob("*")):
+        raise DataError("is an empty folder", str(path), "name a file, or a folder of logs")
 
 
-def _draft(path: Path, folder: Path, board: Board, names: set[str]) -> RecordingDraft:
-    from vgyro.cli.manifest_text import RecordingDraft
-    from vgyro.cli.sniffing import is_parquet, measured_rate
-
-    name = _unique(_identifier(_stem(path)), names)
-    file = path.resolve().relative_to(folder).as_posix()
-    if is_parquet(path):
-        return RecordingDraft(name, file, log=_log(path, board))
-    rate = measured_rate(path, board)
-    notes = [f"its time stamps say {rate:g} Hz, the board's rate is {board.rate_hz:g} Hz"] if rate else []
-    return RecordingDraft(name, file, rate_hz=rate, notes=notes)
-
-
-def _log(path: Path, board: Board) -> LogDraft:
-    """Columns of a Parquet log, and which gyro each one is: by name, or the same name but for case and signs."""
-    from vgyro.cli.manifest_text import LogDraft
-    from vgyro.cli.sniffing import columns_of
-
-    there = columns_of(path)
-    plain = {re.sub(r"[^a-z0-9]", "", column.lower()): column for column in there}
-    columns, missing = {}, []
-    for gyro in board.gyros:
-        found = next((name for name in (gyro.field, gyro.name) if name in there), None)
-        alike = plain.get(re.sub(r"[^a-z0-9]", "", gyro.field.lower())) or plain.get(f"gyro{gyro.field.lower()[1:]}")
-        if found or alike:
-            columns[found or gyro.field] = found or str(alike)
-        else:
-            missing.append(gyro.field)
-    time = next((column for column in there if column.lower() in {"time", "t", "time_s", "t_s", "seconds"}), None)
-    floating = any(there[column] for column in columns.values())
-    return LogDraft(columns, missing, list(there), time, "rates" if floating else "counts")
-
-
-def _folder_text(folder: Path, manifest: Path) -> str:
+def folder_text(folder: Path, manifest: Path) -> str:
     """Relative inside the project, so that it can be moved; absolute outside."""
     if folder.is_relative_to(Path.cwd()):
         return Path(os.path.relpath(folder, manifest.resolve())).as_posix()
     return folder.as_posix()
+
+
+def recording_names(files: Sequence[Path]) -> list[str]:
+    """A name for each file, all different."""
+    from vgyro.dataset import RESERVED
+
+    names: list[str] = []
+    for path in files:
+        number, base = 1, identifier(_stem(path))
+        chosen = base
+        while chosen in names or chosen in RESERVED:
+            number += 1
+            chosen = f"{base}-{number}"
+        names.append(chosen)
+    return names
 
 
 def _stem(path: Path) -> str:
@@ -157,16 +179,6 @@ def _stem(path: Path) -> str:
     return name
 
 
-def _identifier(text: str) -> str:
+def identifier(text: str) -> str:
+    """The text as the name of a recording or data set."""
     return re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-_") or "recording"
-
-
-def _unique(name: str, names: set[str]) -> str:
-    from vgyro.dataset import RESERVED
-
-    number, chosen = 1, name
-    while chosen in names or chosen in RESERVED:
-        number += 1
-        chosen = f"{name}-{number}"
-    names.add(chosen)
-    return chosen

@@ -1,56 +1,54 @@
-"""Which board made these files? By the frames of a dump, or by the columns of a log."""
+"""Dump or log, and which board made it? By the frames of a dump, or by the columns of a log and their values."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
+
 from vgyro.board import Board
+from vgyro.cli.manifest_text import LogDraft
 from vgyro.errors import DataError
-from vgyro.storage.inputs import read_board
+from vgyro.log import Log
+from vgyro.storage.frames import channel_watches
+from vgyro.storage.inputs import files_inside, read_board
+from vgyro.storage.logs.families import family_of, open_log
+from vgyro.storage.logs.roles import roles_of
+from vgyro.storage.logs.table import LogFile, LogTable
 from vgyro.storage.sniff import all_boards, sniff
 
-PARQUET_MAGIC = b"PAR1"
 ENOUGH = 0.5
 RATE_TOLERANCE = 0.01
+MOST_OUT_OF_RANGE = 0.5
+HEAD_ROWS = 20_000
 
 
-def is_parquet(path: Path) -> bool:
-    """True for a Parquet file, and for a folder (of Parquet files)."""
+def is_dump(path: Path, boards: Path) -> bool:
+    """Is a file a dump of frames? A text is one where a board's lines make up most of it.
+
+    raises : DataError where it is neither a dump of a known board nor a log
+    """
     if path.is_dir():
-        return True
-    with open(path, "rb") as stream:
-        return stream.read(len(PARQUET_MAGIC)) == PARQUET_MAGIC
+        return False
+    try:
+        family = family_of(path)
+    except DataError as error:
+        found = sniff(path, all_boards(boards))
+        if found and found[0].good_share >= ENOUGH:
+            return True
+        best = f"; the nearest, {found[0].board}, explains {found[0].good_share:.0%} of it" if found else ""
+        remedy = "name the board by --board, or describe it (docs/extending.md)"
+        what = f"no board of {boards} fits its first megabyte{best}; and as a log it {error.what}"
+        raise DataError(what, str(path), error.remedy or remedy) from None
+    if family != "text":
+        return False
+    found = sniff(path, all_boards(boards))
+    return bool(found) and found[0].good_share >= ENOUGH
 
 
 def best_board(path: Path, boards: Path) -> tuple[Board, list[str]]:
-    """The board that fits a file best, and why.  raises : DataError where none does"""
-    return _by_columns(path, boards) if is_parquet(path) else _by_frames(path, boards)
-
-
-def measured_rate(path: Path, board: Board) -> float | None:
-    """The rate of a dump by its time stamps, Hz, where it contradicts the board's; else None."""
-    if is_parquet(path):
-        return None
-    found = sniff(path, [board])
-    rate = found[0].rate_hz if found else None
-    if rate is None or abs(rate / board.rate_hz - 1) <= RATE_TOLERANCE:
-        return None
-    return round(rate, 3)
-
-
-def columns_of(path: Path) -> dict[str, bool]:
-    """Columns of a Parquet file, or of the first one in a folder: name → floating point?  raises : DataError"""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    file = min(path.rglob("*.parquet")) if path.is_dir() else path
-    try:
-        return {column.name: pa.types.is_floating(column.type) for column in pq.read_schema(file)}
-    except (pa.ArrowException, OSError) as error:
-        raise DataError(f"not a Parquet file: {error}", str(file), "name a dump or a whole Parquet file") from None
-
-
-def _by_frames(path: Path, boards: Path) -> tuple[Board, list[str]]:
+    """The board whose frames fit a dump best, and why.  raises : DataError where none does"""
     found = sniff(path, all_boards(boards))
     if not found or found[0].good_share < ENOUGH:
         best = f"; the nearest, {found[0].board}, explains {found[0].good_share:.0%} of it" if found else ""
@@ -64,11 +62,77 @@ def _by_frames(path: Path, boards: Path) -> tuple[Board, list[str]]:
     return read_board(first.board, boards=boards), notes
 
 
-def _by_columns(path: Path, boards: Path) -> tuple[Board, list[str]]:
-    columns = set(columns_of(path))
+def measured_rate(path: Path, board: Board) -> float | None:
+    """The rate of a dump by its time stamps, Hz, where it contradicts the board's; else None."""
+    found = sniff(path, [board])
+    rate = found[0].rate_hz if found else None
+    if rate is None or abs(rate / board.frame_rate_hz - 1) <= RATE_TOLERANCE:
+        return None
+    return round(rate, 3)
+
+
+def board_of_columns(path: Path, boards: Path) -> tuple[Board | None, list[str]]:
+    """The board each of whose gyros has a column of its name with values in its range, and why; None where none has."""
+    opened = opened_log(path)
     for board in all_boards(boards):
-        if all({gyro.name, gyro.field} & columns for gyro in board.gyros):
-            return board, [f"guessed: {path.name} has a column for each of its gyros"]
-    known = ", ".join(sorted(columns))
-    what = f"no board of {boards} has gyros with the names of its columns: {known}"
-    raise DataError(what, str(path), "name the board by --board")
+        for table in opened.tables:
+            there = {column.name for column in table.columns}
+            fields = [next((name for name in (gyro.field, gyro.name) if name in there), None) for gyro in board.gyros]
+            if None not in fields and in_range(opened, table, board, [str(name) for name in fields]):
+                return board, [f"guessed: {path.name} has a column for each of its gyros, with values in its range"]
+    return None, []
+
+
+def in_range(opened: LogFile, table: LogTable, board: Board, columns: list[str]) -> bool:
+    """Are the values of the gyros within the rails of the board, most of them, and whole where it gives counts?"""
+    batch = next(iter(opened.rows(table.name, columns))).batch
+    floating = any(np.any(values != np.rint(values)) for values in map(_known, batch.columns))
+    watches = channel_watches(board, rates=floating)
+    for gyro, column in zip(board.gyros, batch.columns, strict=True):
+        values, watch = _known(column), watches[gyro.field]
+        if not len(values) or np.mean((values <= watch.low) | (values >= watch.high)) > MOST_OUT_OF_RANGE:
+            return False
+    return True
+
+
+def _known(column: object) -> np.ndarray:
+    values = column.to_numpy(zero_copy_only=False)[:HEAD_ROWS].astype(np.float64)  # type: ignore[attr-defined]
+    return values[np.isfinite(values)]
+
+
+def opened_log(path: Path) -> LogFile:
+    """A log, or the first one of a folder."""
+    return open_log(files_inside(path)[0] if path.is_dir() else path, Log())
+
+
+def log_draft(path: Path, board: Board) -> LogDraft:
+    """Columns of a board's log, and which gyro each one is: by name, or the same name but for case and signs."""
+    opened = opened_log(path)
+    table = max(opened.tables, key=lambda known: sum(gyro.field in _names(known) for gyro in board.gyros))
+    there = _names(table)
+    plain = {re.sub(r"[^a-z0-9]", "", column.lower()): column for column in there}
+    columns, missing = {}, []
+    for gyro in board.gyros:
+        found = next((name for name in (gyro.field, gyro.name) if name in there), None)
+        alike = plain.get(re.sub(r"[^a-z0-9]", "", gyro.field.lower())) or plain.get(f"gyro{gyro.field.lower()[1:]}")
+        if found or alike:
+            columns[found or gyro.field] = found or str(alike)
+        else:
+            missing.append(gyro.field)
+    batch = next(iter(opened.rows(table.name, list(there)))).batch
+    head = {name: batch.column(name).to_numpy(zero_copy_only=False)[:HEAD_ROWS] for name in there}
+    floating = any(np.any(known != np.rint(known)) for known in (_known(batch.column(one)) for one in columns.values()))
+    return LogDraft(
+        family=opened.family,
+        there=list(there),
+        time=roles_of(table.columns, head).time,
+        table=table.name if len(opened.tables) > 1 else None,
+        places={name: column for name, column in columns.items() if name != column},
+        form=list(table.text),
+        values="rates" if floating else "counts",
+        missing=missing,
+    )
+
+
+def _names(table: LogTable) -> list[str]:
+    return [column.name for column in table.columns]

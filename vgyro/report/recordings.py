@@ -51,7 +51,7 @@ def _row(recording: RecordingPart, longest: float) -> Row:
         Cell(duration(float(record["duration_s"]))),
         *(Cell(count(frames[name])) for name in ("good", "bad", "lost")),
         Cell(count(gaps), _longest_gap(record["gaps"])),
-        Cell(plain(float(record["declared_rate_hz"]))),
+        Cell(MISSING if record["declared_rate_hz"] is None else plain(float(record["declared_rate_hz"]))),
         Cell(MISSING if measured is None else plain(float(measured)), hint=str(record["rate_note"])),
         Cell(channel_words(record["channels"], longest)),
     )

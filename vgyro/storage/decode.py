@@ -8,10 +8,11 @@ from pathlib import Path
 from vgyro.board import Board
 from vgyro.config import IntegrityOptions
 from vgyro.dataset import Recording
+from vgyro.log import LogArray
 from vgyro.storage.dumps import CHUNK_BYTES, DumpReader
 from vgyro.storage.frames import Frames, Reader, gather
 from vgyro.storage.inputs import BOARDS
-from vgyro.storage.parquetlog import LogReader
+from vgyro.storage.logs.reader import LogReader
 
 
 def decode_dump(
@@ -40,15 +41,16 @@ def open_recording(
     chunk_bytes: int = CHUNK_BYTES,
     boards: Path = BOARDS,
     engine: str = "native",
+    array: LogArray | None = None,
 ) -> Reader:
-    """Stream a recording of dumps or Parquet logs.
+    """Stream a recording of dumps or logs.
 
     returns : an iterable of Frames; its `integrity` is set when the last chunk is read
     raises  : DataError for a missing or empty file, a wrong column; while it is read, Refused
     boards  : folder of the boards that are tried when this one does not fit
-    engine  : of the search for the frames of a dump
+    engine  : of the search for the frames of a dump, and of the numbers of a text
+    array   : the gyros of a log, where the manifest names them itself
     """
-    rate_hz = recording.rate_hz or board.frame_rate_hz
     if recording.log is not None:
-        return LogReader(paths, recording.log, board, rate_hz, options)
-    return DumpReader(paths, board, rate_hz, options, chunk_bytes, boards, engine)
+        return LogReader(paths, recording, board, options, array, engine)
+    return DumpReader(paths, board, recording.rate_hz or board.frame_rate_hz, options, chunk_bytes, boards, engine)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from pathlib import Path
 
 from vgyro.board import Board, parse_board
@@ -11,6 +13,8 @@ from vgyro.errors import ConfigError
 from vgyro.validation import InvalidFile, Problem, did_you_mean, locate
 
 BOARDS = Path("config/boards")
+BAG_RECORD = "metadata.yaml"
+PACKED = (".gz", ".zst")
 
 
 def read_config(path: str | Path) -> Config:
@@ -55,12 +59,45 @@ def read_dataset(path: str | Path, boards: Path = BOARDS) -> tuple[Manifest, Boa
 
 
 def data_files(manifest: Manifest, recording: str, folder: Path) -> list[Path]:
-    """The files of a recording, globs expanded, in the manifest's order; a pattern without a file stays."""
+    """The files of a recording, globs and folders of logs opened, in the manifest's order; what is not there stays."""
     base = folder / Path(manifest.folder).expanduser()
+    known = manifest.recording(recording)
     found: list[Path] = []
-    for pattern in manifest.recording(recording).files:
-        found += matching_files(base, pattern)
+    for pattern in known.files:
+        for path in matching_files(base, pattern):
+            found += files_inside(path) if known.log is not None and path.is_dir() else [path]
     return found
+
+
+def files_inside(folder: Path) -> list[Path]:
+    """Logs in a folder, by path: those of the commonest ending, so that a note beside them is none.
+
+    Numbers in a path count as numbers: day=9 comes before day=10. A ROS 2 bag is a folder, and one log. An empty folder
+    stays as it is.
+    """
+    if (folder / BAG_RECORD).is_file():
+        return [folder]
+    inside = [path for path in folder.rglob("*") if path.is_file() and not _hidden(path.relative_to(folder))]
+    endings = Counter(_ending(path) for path in inside)
+    if not endings:
+        return [folder]
+    most = max(endings, key=lambda ending: (endings[ending], ending))
+    return sorted((path for path in inside if _ending(path) == most), key=natural)
+
+
+def natural(path: Path) -> list[tuple[int, int, str]]:
+    """Key that sorts paths with their numbers as numbers."""
+    parts = re.split(r"(\d+)", path.as_posix())
+    return [(1, int(part), "") if part.isdigit() else (0, 0, part) for part in parts]
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith((".", "_")) for part in path.parts)
+
+
+def _ending(path: Path) -> str:
+    name = path.with_suffix("") if path.suffix.lower() in PACKED else path
+    return name.suffix.lower()
 
 
 def matching_files(base: Path, pattern: str) -> list[Path]:

@@ -51,12 +51,13 @@ class Gap:
 
 @dataclass(frozen=True)
 class ChannelRecord:
-    """Samples at a rail, and the longest run of equal samples: begin and duration, s."""
+    """Samples at a rail, the longest run of equal samples (begin and duration, s), and rows without a value."""
 
     clipped: int
     clipped_share: float
     stuck_start: float
     stuck_duration: float
+    missing: int = 0
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,9 @@ class FrameCount:
 class Integrity:
     """What decoding found. status: good, suspect or refused; reasons say why, in plain sentences.
 
-    rate_hz : the rate to analyse with: the declared one, or the measured one where the two contradict each other
+    rate_hz : the rate to analyse with: of a log with time stamps the measured one; else the declared one, or the
+              measured one where the two contradict each other
+    clocks  : of a log, what the stamps of each stream are (vgyro.storage.clocks); of a dump none
     """
 
     board: str
@@ -92,10 +95,11 @@ class Integrity:
     frames: FrameCount
     duration_s: float
     rate_hz: float
-    declared_rate_hz: float
+    declared_rate_hz: float | None
     measured_rate_hz: float | None
     rate_note: str
     segments: int
+    clocks: list[dict[str, Any]]
     restarts: int
     gaps: list[Gap]
     gaps_not_listed: dict[str, int]
@@ -166,6 +170,7 @@ class ChannelWatch:
     clipped: int = 0
     stuck_start: float = 0.0
     stuck_duration: float = 0.0
+    missing: int = 0
     _value: Any = None
     _since: float = 0.0
 
@@ -173,7 +178,10 @@ class ChannelWatch:
         self._longest_run = engines.get(self.engine).frames.longest_run
 
     def feed(self, values: np.ndarray, time: np.ndarray) -> None:
-        """Take the next samples."""
+        """Take the next samples; NaN is none."""
+        if values.dtype.kind == "f" and (gone := np.isnan(values)).any():
+            self.missing += int(gone.sum())
+            values, time = values[~gone], time[~gone]
         if not len(values):
             return
         self.samples += len(values)
@@ -189,7 +197,8 @@ class ChannelWatch:
     def record(self) -> ChannelRecord:
         """The channel's entry."""
         return ChannelRecord(
-            self.clipped, self.clipped / self.samples if self.samples else 0.0, self.stuck_start, self.stuck_duration
+            self.clipped, self.clipped / self.samples if self.samples else 0.0, self.stuck_start, self.stuck_duration,
+            self.missing,
         )
 
 

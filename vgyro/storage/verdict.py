@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 from vgyro.board import Board
 from vgyro.config import IntegrityOptions
@@ -27,7 +27,11 @@ NEARLY_ALL_GYROS = 0.9
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a reader knows at the end of a recording. end_s: time of the last frame, s; None without frames."""
+    """What a reader knows at the end of a recording. end_s: time of the last frame, s; None without frames.
+
+    declared_rate_hz : None: only the stamps tell;  stamped : the measured rate holds, whatever is declared
+    clocks           : of a log, the record of each stream's clock;  left_out : files that were not read, as sentences
+    """
 
     board: Board
     values: Literal["counts", "rates"]
@@ -35,10 +39,13 @@ class Outcome:
     good: int
     repeated: int
     end_s: float | None
-    declared_rate_hz: float
+    declared_rate_hz: float | None
     measured_rate_hz: float | None
     segments: int
     still: int = 0
+    stamped: bool = False
+    clocks: list[dict[str, Any]] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
 
 
 def conclude(
@@ -56,9 +63,12 @@ def conclude(
     share = good_share(outcome.good, ledger.bad, ledger.lost)
     frames = FrameCount(outcome.good, ledger.bad, ledger.lost, outcome.repeated, share)
     rate_note, contradicts = rate_check(board, declared, measured, options)
-    reasons = [f"{rate_note}: the measured rate is used"] if contradicts else []
+    reasons = [f"left out: {text}" for text in outcome.left_out]
+    reasons += [f"{rate_note}: the measured rate is used"] if contradicts else []
     reasons += suspicions(board, frames, ledger, channels, options)
-    rate = measured if contradicts and measured is not None else declared
+    rate = measured if measured is not None and (contradicts or outcome.stamped or declared is None) else declared
+    if rate is None:
+        raise ValueError("a recording without a rate")
     foreign = out_of_range(board, channels, options)
     reasons = [foreign, *reasons] if foreign else reasons
     return Integrity(
@@ -75,6 +85,7 @@ def conclude(
         measured_rate_hz=measured,
         rate_note=rate_note,
         segments=outcome.segments,
+        clocks=outcome.clocks,
         restarts=ledger.restarts,
         gaps=ledger.gaps,
         gaps_not_listed=ledger.more_gaps,
@@ -129,8 +140,12 @@ def out_of_range(board: Board, channels: dict[str, ChannelRecord], options: Inte
     return f"{text} lie at or beyond its limits (integrity.refuse_clipped_share = {limit:g})"
 
 
-def rate_check(board: Board, declared: float, measured: float | None, options: IntegrityOptions) -> tuple[str, bool]:
+def rate_check(
+    board: Board, declared: float | None, measured: float | None, options: IntegrityOptions
+) -> tuple[str, bool]:
     """A sentence on declared and measured rate, and whether they contradict each other."""
+    if declared is None:
+        return f"measured {measured:.6g} Hz by the time stamps; none is declared", False
     if measured is None:
         why = "it holds no time stamps" if board.counter else "it holds neither time stamps nor a frame counter"
         return (
@@ -189,7 +204,7 @@ def notes(board: Board, ledger: Ledger, still: int) -> list[str]:
     return found
 
 
-def unreadable_record(board: Board, rate_hz: float, error: DataError) -> Integrity:
+def unreadable_record(board: Board, rate_hz: float | None, error: DataError) -> Integrity:
     """The record of a recording that could not even be opened."""
     return Integrity(
         board=board.name,
@@ -200,11 +215,12 @@ def unreadable_record(board: Board, rate_hz: float, error: DataError) -> Integri
         files=[],
         frames=FrameCount(0, 0, 0, 0, 0.0),
         duration_s=0.0,
-        rate_hz=rate_hz,
+        rate_hz=rate_hz or 0.0,
         declared_rate_hz=rate_hz,
         measured_rate_hz=None,
         rate_note="not read",
         segments=0,
+        clocks=[],
         restarts=0,
         gaps=[],
         gaps_not_listed={"entries": 0, "frames_lost": 0},

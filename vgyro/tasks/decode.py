@@ -29,13 +29,13 @@ def main(task: Task) -> None:
     manifest = Manifest.model_validate(task.options["manifest"])
     board = Board.model_validate(task.options["board"])
     recording = manifest.recording(task.options["recording"])
-    analysis = task.options.get("analysis", {})
-    options = IntegrityOptions.model_validate(analysis.get("integrity", {}))
+    analysis = task.options["analysis"]
+    options = IntegrityOptions.model_validate(analysis["integrity"])
     values = values_of(manifest, recording)
     provenance = _provenance(task)
     try:
         reader = open_recording(
-            task.inputs["files"], recording, board, options, engine=analysis.get("engine", "native")
+            task.inputs["files"], recording, board, options, engine=analysis["engine"], array=manifest.array
         )
         record = decode(reader, task.output("frames"), provenance, _extra(board, values))
         for reason in record.reasons:
@@ -77,7 +77,7 @@ def _provenance(task: Task) -> Provenance:
     """Hashes of the files that are there: a missing one is a reason to refuse, not to fail; of a folder, its logs'."""
     files: list[Path] = []
     for path in task.inputs["files"]:
-        files += sorted(path.rglob("*.parquet")) if path.is_dir() else [path]
+        files += sorted(one for one in path.rglob("*") if one.is_file()) if path.is_dir() else [path]
     present = {**task.inputs, "files": [path for path in files if path.is_file()]}
     return Task(present, task.outputs, task.options, task.code).provenance()
 

@@ -77,6 +77,18 @@ def everything(wildcards):
     return made + everything_of(LOADED.datasets)
 
 
+def everything_of_one(wildcards):
+    """Every artefact and page of the data set that the command line names."""
+    name = config["only"]
+    return [f"reports/{name}.html", f"results/{name}/headline.json", *everything_of([name])]
+
+
+def pages_made():
+    """The pages that this run wrote."""
+    pages = sorted(Path("reports").rglob("*.html"))
+    return [page for page in pages if page.stat().st_mtime > STARTED]
+
+
 def everything_of_papers(wildcards):
     """Every artefact of the papers' twins."""
     return everything_of(PAPERS)

@@ -1,0 +1,132 @@
+"""Which columns of which files hold the channels of a board; channels of one table and one sensor are a stream."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vgyro.board import Board
+from vgyro.errors import DataError
+from vgyro.log import Log, LogArray, Place
+from vgyro.storage.layout import kept_channels
+from vgyro.storage.logs.table import LogColumn, LogFile, LogTable
+from vgyro.validation import did_you_mean
+
+Where = tuple[tuple[str, int | float | str], ...]
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Channels that are sampled together.
+
+    files   : in order, one after the other in time
+    table   : of each file;  where : column and value of the rows that belong to it
+    columns : channel → column
+    """
+
+    files: tuple[Path, ...]
+    table: str | None
+    where: Where
+    columns: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """What tells it from the others of its recording, for people."""
+        rows = ", ".join(f"{column} = {value}" for column, value in self.where)
+        return " ".join(part for part in (self.files[0].name, self.table or "", rows) if part)
+
+
+def streams_of(
+    files: Sequence[Path], log: Log, board: Board, array: LogArray | None, heads: Mapping[Path, LogFile]
+) -> list[Stream]:
+    """The streams of a recording, in the order of the board's gyros.
+
+    files  : of the recording, in order, folders opened;  heads : those that can be read
+    raises : DataError if a gyro has no column; a thermometer or another channel without one is left out
+    """
+    readable = [path for path in files if path in heads]
+    needed = {gyro.field for gyro in board.gyros}
+    grouped: dict[tuple[tuple[Path, ...], str | None, Where], dict[str, str]] = {}
+    order = [gyro.field for gyro in board.gyros]
+    for channel in dict.fromkeys([*order, *kept_channels(board)]):
+        place, said = place_of(channel, log, board, array)
+        chosen = _files_of(place, readable, files)
+        table = place.table if place.table is not None else log.table
+        if channel not in needed and not said and not _has(heads[chosen[0]], table, place.column):
+            continue
+        # A thermometer of the log's only table goes with the gyros that are there, whatever tells these apart.
+        key = (chosen, _table(heads[chosen[0]], table, place.column), tuple(place.where.items()))
+        grouped.setdefault(key, {})[channel] = place.column
+    return [Stream(files, table, where, columns) for (files, table, where), columns in grouped.items()]
+
+
+def place_of(channel: str, log: Log, board: Board, array: LogArray | None) -> tuple[Place, bool]:
+    """Where a channel stands, and whether the manifest says so: by its own name or its gyro's, else by the same name."""
+    names = [channel, *(gyro.name for gyro in board.gyros if gyro.field == channel)]
+    for name in names:
+        if (place := log.place(name)) is not None:
+            return place, True
+    if array is not None and channel in array.columns:
+        return Place(column=array.columns[channel]), True
+    return Place(column=channel), False
+
+
+def _files_of(place: Place, readable: Sequence[Path], files: Sequence[Path]) -> tuple[Path, ...]:
+    if place.file is None:
+        return tuple(readable)
+    chosen = [path for path in readable if fnmatch.fnmatch(path.name, place.file) or path.match(place.file)]
+    if not chosen:
+        near = did_you_mean(place.file, [path.name for path in files])
+        raise DataError(f"no readable file of the recording fits {place.file!r}{near}", None, "correct `file` in `log`")
+    return tuple(chosen)
+
+
+def _has(log: LogFile, table: str | None, column: str) -> bool:
+    return any(one.name == column for known in log.tables if table in (None, known.name) for one in known.columns)
+
+
+def _table(log: LogFile, table: str | None, column: str) -> str:
+    """The table that holds a column.  raises : DataError if there is none, or several without a name given"""
+    return table_of(log, table, [column]).name
+
+
+def table_of(log: LogFile, table: str | None, columns: Sequence[str]) -> LogTable:
+    """The table of a log that holds some columns; `table`: by that name.
+
+    raises : DataError that lists what is there
+    """
+    where = str(log.path)
+    if table is not None:
+        for known in log.tables:
+            if known.name == table:
+                _check(known, columns, where)
+                return known
+        names = [known.name for known in log.tables]
+        raise DataError(f"has no table {table!r}{did_you_mean(table, names)}", where, "correct `table` in `log`")
+    fitting = [known for known in log.tables if set(columns) <= {column.name for column in known.columns}]
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        names = ", ".join(known.name for known in fitting)
+        raise DataError(f"has several tables with a column {columns[0]!r}: {names}", where, "name one: `table` in `log`")
+    largest = max(log.tables, key=lambda known: len(known.columns))
+    _check(largest, columns, where)
+    raise DataError(f"has no table with the columns {', '.join(columns)}", where, "name the tables in `log.columns`")
+
+
+def _check(table: LogTable, columns: Sequence[str], where: str) -> None:
+    names = [column.name for column in table.columns]
+    for column in columns:
+        if column not in names:
+            remedy = "name the log's columns in the manifest, under `log.columns` or `array`"
+            raise DataError(f"has no column {column!r}{did_you_mean(column, names)}", where, remedy)
+        found = column_of(table, column)
+        if found.kind == "text":
+            raise DataError(f"column {column!r} holds text, not numbers", where, "name another column")
+
+
+def column_of(table: LogTable, name: str) -> LogColumn:
+    """The column of that name; it must be there."""
+    return next(column for column in table.columns if column.name == name)
