@@ -2,6 +2,7 @@
 
 from vgyro.calibration.convert import clipped_samples, fit_phase, sinusoid, to_rates
 from vgyro.calibration.figures import BELOW, FIGURES, MISSING, VALUE, Finding, figure_record, not_measured
+from vgyro.calibration.moves import GyroWindows, find_moves, gyro_windows, runs_of, widened, window_length
 from vgyro.calibration.plateaus import DIRECTION_NAMES, PlateauMeans, average_plateaus, find_plateaus
 from vgyro.calibration.repeatability import bias_repeatability, scale_repeatability
 from vgyro.calibration.rest import find_rest
@@ -26,6 +27,7 @@ __all__ = [
     "Compensation",
     "Finding",
     "GyroNominal",
+    "GyroWindows",
     "PlateauMeans",
     "ScaleFit",
     "ThermalPoints",
@@ -36,13 +38,16 @@ __all__ = [
     "compensate",
     "cross_axis",
     "figure_record",
+    "find_moves",
     "find_plateaus",
     "find_rest",
     "fit_bias_temperature",
     "fit_phase",
     "fit_scale_factor",
+    "gyro_windows",
     "nominal_fit",
     "not_measured",
+    "runs_of",
     "scale_repeatability",
     "scale_temperature",
     "self_heating",
@@ -50,4 +55,6 @@ __all__ = [
     "smooth_temperature",
     "thermal_points",
     "to_rates",
+    "widened",
+    "window_length",
 ]

@@ -20,7 +20,7 @@ from vgyro.calibration import (
     not_measured,
 )
 from vgyro.calibration.figures import FIGURES
-from vgyro.config import CalibrationOptions
+from vgyro.config import CalibrationOptions, RestOptions
 from vgyro.dataset import FileReference, Manifest, values_of
 from vgyro.storage.tables import read_json, write_json
 from vgyro.tasks.block_means import thermometer_of
@@ -41,7 +41,7 @@ def main(task: Task) -> None:
     """inputs : frames, integrity (of calibration, thermal and static recordings, in the manifest's order), references
 
     references : logged rates, of the calibration recordings that have one
-    outputs : calibration;  options : manifest, board, analysis.calibration
+    outputs : calibration;  options : manifest, board, analysis.calibration, analysis.rest
     """
     manifest = Manifest.model_validate(task.options["manifest"])
     board = Board.model_validate(task.options["board"])
@@ -50,7 +50,7 @@ def main(task: Task) -> None:
     tables = [source for source in sources if source.recording.kind == "calibration"]
     tests, problems = fit_tests(tables, board, manifest.latitude_deg, options)
     known = {gyro.name: main_fit(gyro.name, tests, board) for gyro in board.gyros}
-    rests = read_rests(sources, board)
+    rests = read_rests(sources, board, RestOptions.model_validate(task.options.get("analysis", {}).get("rest", {})))
     crossed = cross_axes(tests, board, {name: fit for name, (fit, _) in known.items()}, options)
     gyros = {}
     for gyro in board.gyros:

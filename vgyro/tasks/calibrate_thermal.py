@@ -26,10 +26,12 @@ from vgyro.calibration import (
     to_rates,
 )
 from vgyro.calibration.figures import VALUE
-from vgyro.config import CalibrationOptions
+from vgyro.config import CalibrationOptions, RestOptions
 from vgyro.errors import TooShort
+from vgyro.storage.tables import read_column
 from vgyro.tasks.block_means import BlockMeans, block_means, thermometer_of
 from vgyro.tasks.calibrate_tables import Source, Test
+from vgyro.tasks.moves import moves_of
 from vgyro.units import parts_per_million
 
 SAME_TEMPERATURE = 2.0  # K
@@ -99,8 +101,11 @@ class Thermal:
     note: str = ""
 
 
-def read_rests(sources: Sequence[Source], board: Board) -> Rests:
-    """Means of one second of everything that the recordings at rest say."""
+def read_rests(sources: Sequence[Source], board: Board, options: RestOptions) -> Rests:
+    """Means of one second of everything that the recordings at rest say, without what moves in them.
+
+    options : how motion is told from rest, in a recording whose rests are not listed
+    """
     found: dict[str, tuple[str, BlockMeans]] = {}
     fields = [gyro.field for gyro in board.gyros] + [thermometer.field for thermometer in board.temperatures]
     for kind in ("thermal", "static"):
@@ -109,17 +114,22 @@ def read_rests(sources: Sequence[Source], board: Board) -> Rests:
             rate_hz = source.recording.rate_hz or board.rate_hz
             rails = {} if board.adc is None else {g.field: (board.adc.low, board.adc.high) for g in board.gyros}
             means = block_means(source.frames, fields, max(1.0, 1.0 / rate_hz), rails)
-            found[kind] = source.recording.name, _at_rest(means, source)
+            found[kind] = source.recording.name, _at_rest(means, source, board, rate_hz, options)
     return Rests(found.get("thermal"), found.get("static"))
 
 
-def _at_rest(means: BlockMeans, source: Source) -> BlockMeans:
+def _at_rest(means: BlockMeans, source: Source, board: Board, rate_hz: float, options: RestOptions) -> BlockMeans:
     rest = source.recording.rest
     if rest == "auto":
-        return means
-    inside = np.zeros(means.time.size, dtype=bool)
-    for start, stop in rest:
-        inside |= (means.time >= start) & (means.time <= stop)
+        time = read_column(source.frames, "time")
+        moves = moves_of(source.frames, source.recording, board.gyros, time, rate_hz, options)
+        if moves is None:
+            return means
+        inside = moves.still[np.minimum(np.searchsorted(time, means.time), len(time) - 1)]
+    else:
+        inside = np.zeros(means.time.size, dtype=bool)
+        for start, stop in rest:
+            inside |= (means.time >= start) & (means.time <= stop)
     values = {name: column[inside] for name, column in means.values.items()}
     return BlockMeans(means.seconds, means.time[inside], means.segment[inside], values)
 

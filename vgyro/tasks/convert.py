@@ -27,6 +27,7 @@ from vgyro.storage.frames import gyro_rails
 from vgyro.storage.tables import TableWriter, read_batches, read_column, read_json
 from vgyro.tasks.block_means import block_means
 from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.moves import moves_of
 from vgyro.tasks.reference_log import read_reference
 
 MOSTLY_CLIPPED = 0.01
@@ -53,6 +54,9 @@ def main(task: Task) -> None:
     options = RestOptions.model_validate(task.options["analysis"].get("rest", {}))
     clipped = converter.clipped(frames)
     at_rest = rest_of(converter, frames, time, rate_hz, options)
+    moves = moves_of(frames, recording, board.gyros, time, rate_hz, options)
+    if moves is not None:
+        at_rest &= moves.still
     for mask in clipped.values():
         # A gyro that sits at a rail is bad by itself; it must not take the rest away from the others.
         if mask.any() and mask.mean() <= MOSTLY_CLIPPED:
@@ -66,6 +70,8 @@ def main(task: Task) -> None:
         },
         "temperature": {gyro.name: converter.compensation_record(gyro) for gyro in board.gyros},
     }
+    if moves is not None:
+        extra["moved"] = moves.record
     if reference is not None:
         extra["reference_axis"] = recording.axis or board.axes[0]
     with TableWriter(task.output("rates"), "rates", task.provenance(), extra) as writer:

@@ -14,7 +14,7 @@ rule calibrate:
         mem_mb=2000,
         runtime=20,
     params:
-        options=stage("manifest", "board", "calibration"),
+        options=stage("manifest", "board", "calibration", "rest"),
         code=code("calibrate"),
     shell:
         "python -m vgyro.tasks.calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"
