@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,20 +20,20 @@ from vgyro.storage.logs.opened import (
     OpenedLog, batch_of, check_not_empty, needed, reading, rows_at_a_time,
 )  # fmt: skip
 from vgyro.storage.logs.table import LogColumn, LogTable, Rows
-from vgyro.storage.logs.ulog_scan import Contents, fields_of, scan
+from vgyro.storage.logs.ulog_scan import Contents, copy_needed, fields_of, scan
 
-FIFO = {"sensor_gyro_fifo": "rad/s", "sensor_accel_fifo": "m/s^2"}
+FIFO = {"sensor_gyro_fifo": "rad/s", "sensor_accel_fifo": "m/s²"}
 FIFO_FIELDS = ("timestamp_sample", "dt", "scale", "samples", "x[0]", "y[0]", "z[0]")
 UNITS = {
-    "sensor_gyro": {"x": "rad/s", "y": "rad/s", "z": "rad/s", "temperature": "degC"},
-    "sensor_accel": {"x": "m/s^2", "y": "m/s^2", "z": "m/s^2", "temperature": "degC"},
-    "sensor_combined": {"gyro_rad": "rad/s", "accelerometer_m_s2": "m/s^2", "gyro_integral_dt": "us"},
-    "vehicle_angular_velocity": {"xyz": "rad/s", "xyz_derivative": "rad/s^2"},
-    "vehicle_angular_velocity_groundtruth": {"xyz": "rad/s", "xyz_derivative": "rad/s^2"},
+    "sensor_gyro": {"x": "rad/s", "y": "rad/s", "z": "rad/s", "temperature": "°C"},
+    "sensor_accel": {"x": "m/s²", "y": "m/s²", "z": "m/s²", "temperature": "°C"},
+    "sensor_combined": {"gyro_rad": "rad/s", "accelerometer_m_s2": "m/s²", "gyro_integral_dt": "us"},
+    "vehicle_angular_velocity": {"xyz": "rad/s", "xyz_derivative": "rad/s²"},
+    "vehicle_angular_velocity_groundtruth": {"xyz": "rad/s", "xyz_derivative": "rad/s²"},
     "vehicle_imu": {"delta_angle": "rad", "delta_velocity": "m/s", "delta_angle_dt": "us", "delta_velocity_dt": "us"},
-    "vehicle_acceleration": {"xyz": "m/s^2"},
-    "sensor_mag": {"x": "gauss", "y": "gauss", "z": "gauss", "temperature": "degC"},
-    "sensor_baro": {"pressure": "Pa", "temperature": "degC"},
+    "vehicle_acceleration": {"xyz": "m/s²"},
+    "sensor_mag": {"x": "G", "y": "G", "z": "G", "temperature": "°C"},
+    "sensor_baro": {"pressure": "Pa", "temperature": "°C"},
 }
 """Units that PX4's message definitions state, by topic and field."""
 
@@ -56,16 +57,16 @@ def open_log(path: Path) -> OpenedLog:
     rows: dict[tuple[str, int], int] = {}
     for number, topic in found.topics.items():
         rows[topic] = rows.get(topic, 0) + found.counts.get(number, 0)
-    for (name, instance), count in sorted(rows.items()):
+    for (name, instance), count in rows.items():
         fields = fields_of(name, found.formats)
         if "timestamp" in fields and len(set(fields)) == len(fields) and count:
             title = f"{name}#{instance}" if instance else name
             fifo = name in FIFO and set(FIFO_FIELDS) <= set(fields)
             columns = _fifo_columns(name, fields) if fifo else _columns(name, fields)
-            tables[title] = LogTable(title, columns, None if fifo or found.damaged else count)
+            tables[title] = LogTable(title, columns, None if fifo else count)
 
     def stream(table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
-        return _stream(path, table.name, columns, opened)
+        return _stream(path, found, table, columns, opened)
 
     opened = OpenedLog(path, "ulog", tuple(tables.values()), stream)
     opened.account.notes += _notes(found)
@@ -99,17 +100,15 @@ def _fifo_columns(topic: str, fields: Sequence[str]) -> tuple[LogColumn, ...]:
     return (LogColumn("timestamp", "number", "us"), *axes, *device)
 
 
-def _stream(path: Path, title: str, columns: Sequence[str], opened: OpenedLog) -> Iterator[Rows]:
-    from pyulog import ULog
-
-    topic, _, instance = title.partition("#")
-    # pyulog prints its warnings; ours are notes.
-    with contextlib.redirect_stdout(io.StringIO()):
-        log = ULog(str(path), message_name_filter_list=[topic])
-    data = [one.data for one in log.data_list if one.name == topic and one.multi_id == int(instance or 0)]
-    note = "the file is damaged in places: what can be read is taken"
-    if log.file_corruption and not any("damaged" in known for known in opened.account.notes):
-        opened.account.notes.append(note)
+def _stream(path: Path, found: Contents, table: LogTable, columns: Sequence[str], opened: OpenedLog) -> Iterator[Rows]:
+    topic, _, instance = table.name.partition("#")
+    data = _loaded(path, found, topic, int(instance or 0), found.sound)
+    expected = sum(found.counts.get(number, 0) for number, one in found.topics.items() if one == (topic, int(instance or 0)))
+    if found.sound and _messages(data) < expected:
+        # pyulog stops without a word at some messages: what it needs is copied out from between them.
+        data = _loaded(path, found, topic, int(instance or 0), False)
+    if missing := expected - _messages(data):
+        opened.account.notes.append(f"{table.name}: {missing} of {expected} messages do not fit their type: left out")
     place = 1
     for fields in data:
         held = _unrolled(fields) if topic in FIFO and set(FIFO_FIELDS) <= set(fields) else fields
@@ -118,6 +117,23 @@ def _stream(path: Path, title: str, columns: Sequence[str], opened: OpenedLog) -
             stop = min(start + size, count)
             yield Rows(batch_of(columns, [arrow(held[name][start:stop]) for name in columns]), place + start)
         place += count
+
+
+def _messages(data: Sequence[dict[str, Any]]) -> int:
+    return sum(len(fields["timestamp"]) for fields in data)
+
+
+def _loaded(path: Path, found: Contents, topic: str, instance: int, whole: bool) -> list[dict[str, Any]]:
+    """What pyulog reads of a topic: fields by name. whole: of the file as it is, or of what it needs of it."""
+    from pyulog import ULog
+
+    # pyulog prints its warnings; ours are notes.
+    with contextlib.redirect_stdout(io.StringIO()), tempfile.TemporaryFile() as copy:
+        if not whole:
+            copy_needed(path, found, copy)
+            copy.seek(0)
+        log = ULog(str(path) if whole else copy, message_name_filter_list=[topic])
+    return [one.data for one in log.data_list if one.name == topic and one.multi_id == instance]
 
 
 def _unrolled(fields: dict[str, Any]) -> dict[str, np.ndarray]:

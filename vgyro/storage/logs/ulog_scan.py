@@ -9,11 +9,14 @@ import mmap
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
 MAGIC = b"ULog\x01\x12\x35"
 SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
+HEADER = 16
 HEAD = struct.Struct("<HB")
 KNOWN = frozenset(b"BFIMPQARDLCSO")
+DATA, NOTED, ANYWHERE = ord("D"), frozenset(b"FAOB"), frozenset(b"IMPQLC")
 LARGEST = 1 << 16
 """Most bytes of a message, and so of a format: its length is a number of 16 bits."""
 SIZES = {
@@ -28,18 +31,26 @@ class Contents:
     """What a ULog's headers say.
 
     formats    : of each message type, its fields (type, length of an array or 0, name)
-    topics     : of each subscription in order, (message type, instance)
-    counts     : of each of them, messages
+    topics     : subscriptions by their number, (message type, instance);  counts: messages by that number
+    needed     : places of the bytes that pyulog needs: header, formats, subscriptions, data
     dropout_ms : lengths of the dropouts
     damaged    : bytes that are no message;  cut : does the file end within one?
+    odd        : was a part added later, or is there a message that has no business in its place?
     """
 
     formats: dict[str, list[tuple[str, int, str]]] = field(default_factory=dict)
     topics: dict[int, tuple[str, int]] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
+    needed: list[tuple[int, int]] = field(default_factory=lambda: [(0, HEADER)])
     dropout_ms: list[int] = field(default_factory=list)
     damaged: int = 0
     cut: bool = False
+    odd: bool = False
+
+    @property
+    def sound(self) -> bool:
+        """May pyulog read the file as it is? It can turn in circles in one that is not sound."""
+        return not (self.damaged or self.cut or self.odd)
 
 
 def scan(path: Path) -> Contents:
@@ -53,6 +64,8 @@ def scan(path: Path) -> Contents:
         if file.read(len(MAGIC)) != MAGIC:
             raise ValueError("does not begin as a ULog does")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            if len(data) < HEADER:
+                raise ValueError("ends within its header")
             _walk(data, found)
     for name in found.formats:
         if (size := size_of(name, found.formats)) > LARGEST:
@@ -61,22 +74,39 @@ def scan(path: Path) -> Contents:
 
 
 def _walk(data: mmap.mmap, found: Contents) -> None:
-    place, end, counts = 16, len(data), found.counts
+    place, end, counts, needed = HEADER, len(data), found.counts, found.needed
     while place + 3 <= end:
         length, kind = HEAD.unpack_from(data, place)
-        if kind not in KNOWN or not length:
+        after = place + 3 + length
+        if not length or (kind not in KNOWN and not _follows(data, after)):
             place = _resumed(data, place, found)
             continue
-        after = place + 3 + length
         if after > end:
             break
-        if kind == 0x44:  # D: by far the most
+        wanted = False
+        if kind == DATA:  # by far the most
             number = data[place + 3] | data[place + 4] << 8 if length > 1 else -1
-            counts[number] = counts.get(number, 0) + 1
-        elif kind in b"FAO":
-            _note(chr(kind), data[place + 3 : after], found)
+            if wanted := number in found.topics:
+                counts[number] = counts.get(number, 0) + 1
+            else:
+                found.odd = True
+        elif kind in NOTED:
+            wanted = _note(chr(kind), data[place + 3 : after], found)
+            found.odd |= not wanted and (kind in b"FA" or not found.topics)
+        else:
+            found.odd |= kind not in ANYWHERE and not found.topics
+        if wanted:
+            if needed[-1][1] == place:
+                needed[-1] = (needed[-1][0], after)
+            else:
+                needed.append((place, after))
         place = after
     found.cut = place < end
+
+
+def _follows(data: mmap.mmap, place: int) -> bool:
+    """Is there a message, or the end?"""
+    return place == len(data) or (place + 3 <= len(data) and data[place + 2] in KNOWN)
 
 
 def _resumed(data: mmap.mmap, place: int, found: Contents) -> int:
@@ -92,22 +122,41 @@ def _next_message(data: mmap.mmap, place: int) -> int:
     end = len(data)
     for start in range(place + 1, end - 3):
         length, kind = HEAD.unpack_from(data, start)
-        after = start + 3 + length
-        if kind in KNOWN and length and (after == end or (after + 3 <= end and data[after + 2] in KNOWN)):
+        if kind in KNOWN and length and _follows(data, start + 3 + length):
             return start
     return end
 
 
-def _note(kind: str, content: bytes, found: Contents) -> None:
-    if kind == "O" and len(content) == 2:
+def _note(kind: str, content: bytes, found: Contents) -> bool:
+    """Write down what a message says. Does pyulog need it?  raises : ValueError for flags that nobody knows yet"""
+    if kind == "O" and len(content) == 2 and found.topics:
         found.dropout_ms.append(content[0] | content[1] << 8)
     elif kind == "A" and len(content) > 3:
-        found.topics[content[1] | content[2] << 8] = (content[3:].decode("utf-8", "ignore"), content[0])
-    elif kind == "F":
+        name = content[3:].decode("utf-8", "ignore")
+        if name in found.formats:
+            found.topics[content[1] | content[2] << 8] = (name, content[0])
+            return True
+    elif kind == "F" and not found.topics:
         name, colon, fields = content.decode("utf-8", "ignore").partition(":")
         parts = [one.split(" ") for one in fields.split(";") if one]
         if colon and all(len(part) == 2 for part in parts):
             found.formats[name] = [_field(*part) for part in parts]
+            return True
+    elif kind == "B" and len(content) >= 40 and found.needed[-1][1] == HEADER:
+        if content[8] & ~1 or any(content[9:16]):
+            raise ValueError("made by a newer logger: its flags are unknown")
+        found.odd = any(content[16:40])
+        return not found.odd
+    return False
+
+
+def copy_needed(path: Path, found: Contents, target: IO[bytes]) -> None:
+    """Write what pyulog needs, and no damage, into another file."""
+    with open(path, "rb") as file:
+        for start, stop in found.needed:
+            file.seek(start)
+            while start < stop:
+                start += target.write(file.read(min(stop - start, 1 << 20)))
 
 
 def _field(kind: str, name: str) -> tuple[str, int, str]:
