@@ -102,7 +102,7 @@ def test_parquet_file_and_folder_are_no_dumps(board, tmp_path):
 
 
 def test_board_without_frame(dump, board):
-    with pytest.raises(ConfigError, match="only as archived Parquet logs"):
+    with pytest.raises(ConfigError, match="only as logs"):
         decode_dump([dump(DSP6)], board("adis16405"))
 
 
@@ -148,3 +148,20 @@ def test_the_record_is_json_and_caps_its_lists(dump, board):
     assert plain["damage_not_listed"] == {"entries": 500, "bytes": 500 * 30, "frames_lost": 500}
     assert plain["gaps_not_listed"] == {"entries": 500, "frames_lost": 500}
     assert plain["frames"]["lost"] == 1500
+
+
+@pytest.mark.parametrize("damaged", ["missing", "empty"])
+def test_one_bad_file_of_three_is_named_and_the_others_are_read(tmp_path, board, damaged):
+    half = len(DSP6) // 2 // 30 * 30
+    parts = [tmp_path / name for name in ("a.bin", "b.bin", "c.bin")]
+    parts[0].write_bytes(DSP6[:half])
+    parts[2].write_bytes(DSP6[half:])
+    if damaged == "empty":
+        parts[1].write_bytes(b"")
+    frames = decode_dump(parts, board("dsp6"))
+    assert len(frames.time) == len(decode_dump([parts[0]], board("dsp6")).time) + len(
+        decode_dump([parts[2]], board("dsp6")).time
+    )
+    assert frames.integrity.status == "suspect"
+    assert "b.bin" in frames.integrity.reasons[0]
+    assert frames.integrity.reasons[0].startswith("left out: ")

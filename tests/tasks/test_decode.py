@@ -31,7 +31,7 @@ def run(tmp_path):
             "manifest": manifest.model_dump(mode="json"),
             "board": read_board(board, boards=BOARDS).model_dump(mode="json"),
             "recording": "rest",
-            "analysis": {"integrity": integrity or {}},
+            "analysis": {"integrity": integrity or {}, "engine": "native"},
         }
         arguments = ["--input", "files", *map(str, files), "--output", "frames", str(tmp_path / "frames.parquet")]
         arguments += ["--output", "integrity", str(tmp_path / "integrity.json"), "--options", json.dumps(options)]

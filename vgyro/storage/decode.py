@@ -12,7 +12,6 @@ from vgyro.log import LogArray
 from vgyro.storage.dumps import CHUNK_BYTES, DumpReader
 from vgyro.storage.frames import Frames, Reader, gather
 from vgyro.storage.inputs import BOARDS
-from vgyro.storage.logs.reader import LogReader
 
 
 def decode_dump(
@@ -52,5 +51,7 @@ def open_recording(
     array   : the gyros of a log, where the manifest names them itself
     """
     if recording.log is not None:
+        from vgyro.storage.logs.reader import LogReader
+
         return LogReader(paths, recording, board, options, array, engine)
     return DumpReader(paths, board, recording.rate_hz or board.frame_rate_hz, options, chunk_bytes, boards, engine)

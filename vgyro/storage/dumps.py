@@ -12,6 +12,7 @@ import numpy as np
 from vgyro.board import BinaryFrame, Board, TextFrame
 from vgyro.config import IntegrityOptions
 from vgyro.storage.clock import LOST, PAUSE, Clock, Timed
+from vgyro.storage.diagnose import diagnose
 from vgyro.storage.frames import Frames, channel_watches
 from vgyro.storage.inputs import BOARDS
 from vgyro.storage.integrity import FileRecord, Gap, Integrity, Ledger
@@ -58,6 +59,7 @@ class DumpReader:
         layout = self.board.layout
         self._checked = isinstance(layout, BinaryFrame) or layout.checksum.family != "none"
         self._cut_line: int | None = None
+        self._diagnosis: list[str] | None = None
 
     @property
     def expected_frames(self) -> int:
@@ -168,6 +170,7 @@ class DumpReader:
             measured_rate_hz=self._clock.measured_rate_hz,
             segments=self._segment + 1 if self._good else 0,
             still=self._clock.still,
+            left_out=self._sources.left_out,
         )
         watches = {name: watch.record() for name, watch in self._watches.items()}
         fault = self._fault()
@@ -203,17 +206,28 @@ class DumpReader:
     def _hints(self, seen: Probe) -> list[str]:
         found = [f"the compressed data of {file.name} break off" for file in self._sources.files if file.cut_short]
         counter = self.board.counter
-        if counter and seen.counter_step is not None and seen.counter_step != counter.step:
+        odd = counter is not None and seen.counter_step != counter.step and seen.frames > 1
+        if odd and self._advice():
+            found += self._advice()
+        elif counter and seen.counter_step is not None and odd:
             found.append(
                 f"adjacent frames differ by {seen.counter_step} in the counter, where board {self.board.name} says"
                 f" {counter.step}: if nothing is missing, set counter.step: {seen.counter_step} in the board file"
             )
         return found
 
+    def _advice(self) -> list[str]:
+        """What should be different in the board file, as far as the dump proves it."""
+        if self._diagnosis is None:
+            self._diagnosis = diagnose(self._probe.head, self.board)
+        return self._diagnosis
+
     def _remedy(self) -> str:
         fits = boards_that_fit(self.paths[0], self.boards, self.board.name)
         if fits:
             return f"the file reads as board {' or '.join(fits)}: set `board` in the manifest"
+        if self._advice():
+            return "; ".join(self._advice())
         longest = max((gap for gap in self._ledger.gaps if gap.frames_lost), key=_frames_lost, default=None)
         if longest is not None and _frames_lost(longest) > self._ledger.lost / 2:
             return (

@@ -37,9 +37,13 @@ class SourceFile:
 
 @dataclass
 class Sources:
-    """The files of one recording as one stream of bytes; a frame may begin in one and end in the next."""
+    """The files of one recording as one stream of bytes; a frame may begin in one and end in the next.
+
+    left_out : files that are not there or empty, as sentences; the others are read
+    """
 
     files: list[SourceFile]
+    left_out: list[str] = field(default_factory=list)
     _starts: list[int] = field(default_factory=list)
 
     def chunks(self, size: int) -> Iterator[bytes | memoryview]:
@@ -65,21 +69,35 @@ class Sources:
 
 
 def open_sources(paths: Sequence[str | Path]) -> Sources:
-    """Look at the files of a recording.  raises : DataError if one is missing, empty, a folder or a Parquet file"""
-    files = []
+    """Look at the files of a recording; one that is missing or empty is left out where there are others.
+
+    raises : DataError if none is left, or one is a folder or a Parquet file
+    """
+    files: list[SourceFile] = []
+    errors: list[DataError] = []
     for path in map(Path, paths):
-        check_exists(path)
-        if path.is_dir():
-            raise DataError("is a folder, not a dump", str(path), "name the files, or set `parquet:` if it holds logs")
-        size = path.stat().st_size
-        if size == 0:
-            raise DataError("is empty: 0 bytes", str(path), "copy it again from the logger, or take it off the list")
+        try:
+            check_holds_bytes(path)
+        except DataError as error:
+            errors.append(error)
+            continue
         with open(path, "rb") as stream:
             head = stream.read(4)
         if head == PARQUET:
-            raise DataError("is a Parquet file, not a dump", str(path), "set `parquet:` for this recording")
-        files.append(SourceFile(path, path.name, size, _compression(head)))
-    return Sources(files)
+            raise DataError("is a Parquet file, not a dump", str(path), "set `log:` for this recording")
+        files.append(SourceFile(path, path.name, path.stat().st_size, _compression(head)))
+    if not files:
+        raise errors[0]
+    return Sources(files, [str(error) for error in errors])
+
+
+def check_holds_bytes(path: Path) -> None:
+    """raises : DataError if the file is not there, or is empty, or a folder"""
+    check_exists(path)
+    if path.is_dir():
+        raise DataError("is a folder, not a dump", str(path), "name the files, or set `log:` if it holds logs")
+    if path.stat().st_size == 0:
+        raise DataError("is empty: 0 bytes", str(path), "copy it again from the logger, or take it off the list")
 
 
 def check_exists(path: Path) -> None:

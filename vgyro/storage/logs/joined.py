@@ -20,7 +20,6 @@ from vgyro.storage.logs.reader import Placing
 SINCE_1970_S = 1e8
 """A stamp later than this, in s, counts from 1970: three years of any other clock."""
 BLOCK = 1 << 18
-CLOCKS_MAY_DIFFER_S = 60.0
 
 
 class Whole(NamedTuple):
@@ -86,9 +85,7 @@ class Joined:
         if len({placing.intake.stream.files for placing in self.placings}) == 1:
             return True
         starts = [placing.zero_s for placing in self.placings]
-        return all(placing.intake.kind == "date" or placing.zero_s > SINCE_1970_S for placing in self.placings) and (
-            max(starts) - min(starts) < CLOCKS_MAY_DIFFER_S + max(placing.end_s for placing in self.placings)
-        )
+        return all(start > SINCE_1970_S for start in starts)
 
     def _read_at(self, first: Whole, other: Whole, one_clock: bool) -> dict[str, np.ndarray]:
         """Channels of a stream at the times of the first, NaN where it has none."""

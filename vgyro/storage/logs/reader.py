@@ -25,6 +25,7 @@ from vgyro.storage.logs.table import LogFile
 from vgyro.storage.tables import sha256_of_file
 from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
 
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 WITHOUT_VALUE = "rows without a value"
 
 
@@ -126,6 +127,17 @@ class Placing:
             self.clock = RowClock(rate_hz, intake.damaged, intake.stream.name)
         else:
             self.clock = survey(self._stamps(), clock_options(intake, rate_hz))
+
+    @property
+    def zero_s(self) -> float:
+        """The first stamp, s on the log's own clock; 0 without stamps."""
+        if self.intake.time is None:
+            return 0.0
+        for stamps, _ in self._stamps():
+            known = stamps[np.isfinite(stamps)]
+            if len(known):
+                return float(known[0]) * SECONDS[self.clock.record().unit]
+        return 0.0
 
     @property
     def measured_rate_hz(self) -> float | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vgyro.errors import DataError
-from vgyro.storage.clocks import ClockGap, ClockRecord, Placed
+from vgyro.storage.clocks.model import MAX_GAPS, ClockGap, ClockRecord, Placed
 
 CAUSE = "damaged lines"
 
@@ -48,6 +48,9 @@ class RowClock:
             for row, lost, count in zip(rows, before, counts, strict=True)
         ]
         return ClockRecord(
-            meaning="none", why="there is no time column: a row is a period of the declared rate",
-            rate_hz=self._rate_hz, lost=int(counts.sum()), gaps=gaps,
+            meaning="none", even=None, time_from="rate", why="there is no time column: a row is a period of the rate",
+            unit="", unit_why="", samples=self._row, rate_hz=self._rate_hz, rate_sd_hz=None, drift_ppm=None,
+            jitter_s=None, resolution_s=None, wrap_s=None, wraps=0, midnights=0, restarts=0, repeated=0, held=1.0,
+            lost=int(counts.sum()), least_loss=None, uneven=0.0, gaps=gaps[:MAX_GAPS],
+            gaps_not_listed=max(0, len(gaps) - MAX_GAPS), bad_stamps=0, warnings=[],
         )  # fmt: skip
