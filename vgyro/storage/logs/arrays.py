@@ -53,8 +53,8 @@ def blocks_of(array: np.ndarray) -> Callable[[int], Iterator[np.ndarray]]:
 def tables_of(variables: Sequence[Variable], path: Path) -> dict[str, tuple[LogTable, list[Leaf]]]:
     """Tables by name, each with its columns.
 
-    Vectors of one length, and matrices with as many rows (or, turned, columns), are the table "". What is left over makes
-    tables of its own; a single value makes none.
+    Vectors of one length, and matrices with as many rows (or, turned, columns), are the table "". What is left over
+    makes tables of its own; a single value makes none.
     """
     together = _together(variables)
     tables = {"": _table("", together, path)} if together else {}
@@ -92,7 +92,7 @@ def _table(name: str, variables: Sequence[Variable], path: Path) -> tuple[LogTab
 
 
 def _spread(name: str, dtype: np.dtype, inner: tuple[int, ...]) -> Iterator[tuple[str, Kind, str, Take]]:
-    """The columns of blocks [n, *inner] of a dtype: name, name[0] …, name.field; of an array without a name c1, c2, …"""
+    """The columns of blocks [n, *inner]: name, name[0] …, name.field; those of an array without a name: c1, c2, …"""
     if len(inner) > 1:
         return
     if dtype.names is not None:

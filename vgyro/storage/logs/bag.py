@@ -17,7 +17,16 @@ import pyarrow as pa
 from vgyro.storage.logs.bag_fields import ARRAY, Leaf, has_sequences, leaves_of
 from vgyro.storage.logs.bag_files import MCAP, ROS1, check_profile, kind_of, readable, whole_mcap
 from vgyro.storage.logs.opened import (
-    DAMAGE, Errors, OpenedLog, Unique, batch_of, check_not_empty, needed, reading, reason, until_damage,
+    DAMAGE,
+    Errors,
+    OpenedLog,
+    Unique,
+    batch_of,
+    check_not_empty,
+    needed,
+    reading,
+    reason,
+    until_damage,
 )  # fmt: skip
 from vgyro.storage.logs.table import BadLine, LogColumn, LogTable, Rows
 
@@ -40,8 +49,8 @@ class Topic:
 def open_log(path: Path) -> OpenedLog:
     """Open a .bag, a folder of a ROS 2 bag, an .mcap or a .db3; rosbags reads its index.
 
-    columns : "time", then the message's fields by dots; arrays as name[0] …, those of any length as long as in the first
-              message, and null where a later one is shorter; stamps as ns since 1970; units where ROS fixes them
+    columns : "time", then the message's fields by dots; arrays as name[0] …, those of any length as long as in the
+              first message, and null where a later one is shorter; stamps as ns since 1970; units where ROS fixes them
     Message types come with the bag; where an old SQLite bag has none, those of ROS itself are known. Topics without
     numbers are left out; so are pictures and other long arrays. Messages are streamed by "time"; the index of a ROS 1
     bag is in memory, about 150 bytes a message. An MCAP that breaks off is read up to its last whole chunk.
@@ -62,7 +71,9 @@ def open_log(path: Path) -> OpenedLog:
         for name, group in _grouped(reader.connections).items():
             topic = _topic(name[0], group, reader, kind == ROS1, notes, errors)
             if topic and any(leaf.column.kind == "number" for leaf in topic.leaves.values()):
-                table = LogTable(unique(name[0]), (TIME, *(leaf.column for leaf in topic.leaves.values())), _count(group))
+                table = LogTable(
+                    unique(name[0]), (TIME, *(leaf.column for leaf in topic.leaves.values())), _count(group)
+                )
                 topics[table.name] = topic
                 tables.append(table)
 
@@ -152,7 +163,9 @@ def _store(connection: Any, ros1: bool) -> Any:
         types.update(get_types_from_msg(definition.data, msgtype))
     else:
         mark = "=" * 80 + "\nIDL: "
-        for part in definition.data.removeprefix(mark).split(mark) if mark in definition.data else [f"\n{definition.data}"]:
+        for part in (
+            definition.data.removeprefix(mark).split(mark) if mark in definition.data else [f"\n{definition.data}"]
+        ):
             types.update(get_types_from_idl(part.partition("\n")[2]))
     for _, fields in types.values():
         for _, (node, inner) in fields:

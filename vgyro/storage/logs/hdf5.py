@@ -47,7 +47,13 @@ def _walk(group: Any, prefix: str, path: Path, variables: list[Variable], notes:
             raise ValueError(f"more than {MOST} arrays")
         item, name = group[key], f"{prefix}{key}"
         kind = _class(item)
-        if "MATLAB_object_decode" in item.attrs or kind in ("table", "timetable", "datetime", "duration", "categorical"):
+        if "MATLAB_object_decode" in item.attrs or kind in (
+            "table",
+            "timetable",
+            "datetime",
+            "duration",
+            "categorical",
+        ):
             notes.append(f"{name} is an object of MATLAB ({kind or 'opaque'}): left out")
         elif isinstance(item, h5py.Group):
             _walk(item, f"{name}.", path, variables, notes, depth + 1)

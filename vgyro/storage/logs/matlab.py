@@ -34,9 +34,9 @@ def open_log(path: Path) -> OpenedLog:
     """Open a .mat.
 
     Vectors of one length, and matrices with as many rows or columns, are the table "", with columns name, or name[0],
-    name[1], … Matrices of other lengths are a table each. The fields of structs are name.field. Cells, texts, objects and
-    complex numbers are left out, with a note. A 5.0 file's variables are loaded whole when they are read, one at a time;
-    its structs, when it is opened.
+    name[1], … Matrices of other lengths are a table each. The fields of structs are name.field. Cells, texts, objects
+    and complex numbers are left out, with a note. A 5.0 file's variables are loaded whole when they are read, its
+    structs when it is opened; a -v7.3 file is streamed.
     raises : DataError for a file that is not MATLAB's, or whose tables MATLAB alone can read (timetable)
     """
     check_not_empty(path)

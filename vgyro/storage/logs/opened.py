@@ -29,7 +29,7 @@ DAMAGE: tuple[type[Exception], ...] = (
     ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError, NotImplementedError, OSError,
     RecursionError, RuntimeError, SyntaxError, TypeError, ValueError, pa.ArrowException, struct.error, zlib.error,
 )  # fmt: skip
-"""What libraries raise on damaged files: none says so in its documentation, so these are the ones that fuzzing found."""
+"""What libraries raise on damaged files, beside errors of their own: their documentation does not list it."""
 
 T = TypeVar("T")
 Errors = tuple[type[Exception], ...]
@@ -52,7 +52,9 @@ def reading(what: str, path: Path, errors: Errors = ()) -> Iterator[None]:
     except DataError:
         raise
     except (*DAMAGE, *errors) as error:
-        raise DataError(f"is not a readable {what} ({reason(error)})", str(path), "copy it again from its source") from None
+        raise DataError(
+            f"is not a readable {what} ({reason(error)})", str(path), "copy it again from its source"
+        ) from None
 
 
 def until_damage(items: Iterator[T], errors: Errors, broken: list[str]) -> Iterator[T]:
@@ -127,7 +129,9 @@ class OpenedLog:
     def __post_init__(self) -> None:
         if not self.tables:
             what = "; ".join(["holds no table of numbers", *self.account.notes])
-            raise DataError(what, str(self.path), "check that it is the recording's log, and that it was closed properly")
+            raise DataError(
+                what, str(self.path), "check that it is the recording's log, and that it was closed properly"
+            )
         if not self.account.content_bytes and self.path.is_file():
             self.account.content_bytes = self.path.stat().st_size
 

@@ -14,7 +14,13 @@ import pyarrow as pa
 
 from vgyro.errors import DataError
 from vgyro.storage.logs.opened import (
-    WIDEST, OpenedLog, Unique, batch_of, check_not_empty, reading, rows_at_a_time,
+    WIDEST,
+    OpenedLog,
+    Unique,
+    batch_of,
+    check_not_empty,
+    reading,
+    rows_at_a_time,
 )  # fmt: skip
 from vgyro.storage.logs.table import Kind, LogColumn, LogTable, Rows
 

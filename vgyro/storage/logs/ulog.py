@@ -17,7 +17,12 @@ import numpy as np
 
 from vgyro.storage.logs.arrays import arrow
 from vgyro.storage.logs.opened import (
-    OpenedLog, batch_of, check_not_empty, needed, reading, rows_at_a_time,
+    OpenedLog,
+    batch_of,
+    check_not_empty,
+    needed,
+    reading,
+    rows_at_a_time,
 )  # fmt: skip
 from vgyro.storage.logs.table import LogColumn, LogTable, Rows
 from vgyro.storage.logs.ulog_scan import Contents, copy_needed, fields_of, scan
@@ -103,7 +108,9 @@ def _fifo_columns(topic: str, fields: Sequence[str]) -> tuple[LogColumn, ...]:
 def _stream(path: Path, found: Contents, table: LogTable, columns: Sequence[str], opened: OpenedLog) -> Iterator[Rows]:
     topic, _, instance = table.name.partition("#")
     data = _loaded(path, found, topic, int(instance or 0), found.sound)
-    expected = sum(found.counts.get(number, 0) for number, one in found.topics.items() if one == (topic, int(instance or 0)))
+    expected = sum(
+        found.counts.get(number, 0) for number, one in found.topics.items() if one == (topic, int(instance or 0))
+    )
     if found.sound and _messages(data) < expected:
         # pyulog stops without a word at some messages: what it needs is copied out from between them.
         data = _loaded(path, found, topic, int(instance or 0), False)
