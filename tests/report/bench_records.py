@@ -49,7 +49,7 @@ def integrity(name: str) -> dict[str, Any]:
     damage = (
         [{"file": "rest.bin", "start": 1200, "stop": 1260, "frames_lost": 25, "cause": "checksum <&>"}] if held else []
     )
-    channel = {"clipped": 0, "clipped_share": 0.0, "stuck_start": 0.0, "stuck_duration": 0.02}
+    channel = {"clipped": 0, "clipped_share": 0.0, "stuck_start": 0.0, "stuck_duration": 0.02, "missing": 0}
     odd = {
         "g2": {**channel, "clipped": 17, "clipped_share": 0.0003},
         "g3": {**channel, "stuck_start": 8.0, "stuck_duration": 2.5},
@@ -82,6 +82,7 @@ def integrity(name: str) -> dict[str, Any]:
         "measured_rate_hz": 49.987,
         "rate_note": "measured 49.987 Hz, declared 50 Hz (-0.026 %)",
         "segments": 1 + len(gaps),
+        "clocks": [],
         "restarts": 0,
         "gaps": gaps,
         "gaps_not_listed": {"entries": 0, "frames_lost": 0},

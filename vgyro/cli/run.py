@@ -18,8 +18,12 @@ examples:
   vgyro run one.csv two.csv three.csv --together --rate 100
   vgyro run --name bench                  again, after an edit of raw/bench/dataset.yaml
 
-exit codes: those of new-dataset and check, and
+exit codes:
+  0  the page is there
   1  a job of the pipeline failed: its message is above, its traceback in results/logs
+  2  an option is needed that the files do not tell
+  3  the manifest that was edited has a mistake
+  4  a file is not there, is empty, or cannot be read
 """
 
 

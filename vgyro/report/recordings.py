@@ -7,9 +7,11 @@ from typing import Any
 
 from markupsafe import Markup
 
+from vgyro.report.clocks import clocks_part
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import DatasetPart, RecordingPart
 from vgyro.report.numbers import MISSING, count, duration, percent, plain
+from vgyro.report.sentences import moved_words
 from vgyro.report.tables import Cell, Column, Row, Tone, render_table
 
 MOST_LISTED = 50
@@ -27,7 +29,7 @@ COLUMNS = (
     Column("gaps", hint="interruptions; nothing is put in their place"),
     Column("declared", "Hz", group="sample rate"),
     Column("measured", "Hz", group="sample rate"),
-    Column("clipped or stuck channels", numeric=False),
+    Column("clipped, stuck or missing channels", numeric=False),
 )
 
 
@@ -35,19 +37,20 @@ def recordings_part(dataset: DatasetPart) -> Markup:
     """Table of the recordings, why one was refused or is suspect, and the damage in detail."""
     longest = float(dataset.options.get("integrity", {}).get("stuck_s", STUCK_S))
     table = render_table(COLUMNS, [_row(recording, longest) for recording in dataset.recordings])
-    return join(table, *(_remarks(recording) for recording in dataset.recordings), *map(_detail, dataset.recordings))
+    remarks = [_remarks(recording) for recording in dataset.recordings]
+    return join(table, *remarks, *map(clocks_part, dataset.recordings), *map(_detail, dataset.recordings))
 
 
 def _row(recording: RecordingPart, longest: float) -> Row:
     record = recording.integrity
-    status = str(record["status"])
+    status = recording.status
     frames = record["frames"]
     gaps = len(record["gaps"]) + record["gaps_not_listed"]["entries"]
     measured = record["measured_rate_hz"]
     cells = (
         Cell(recording.name),
         Cell(recording.kind),
-        Cell(status, tone=TONES.get(status, "")),
+        Cell(status, "" if recording.moved is None else "the board moved", TONES.get(status, "")),
         Cell(duration(float(record["duration_s"]))),
         *(Cell(count(frames[name])) for name in ("good", "bad", "lost")),
         Cell(count(gaps), _longest_gap(record["gaps"])),
@@ -78,6 +81,8 @@ def channel_words(channels: Mapping[str, Any], longest: float = STUCK_S) -> str:
     ]
     words = [f"clipped: {_listed(clipped)}"] if clipped else []
     words += [f"stuck: {_listed(stuck)}"] if stuck else []
+    gone = [f"{name} ({count(record['missing'])})" for name, record in channels.items() if record["missing"]]
+    words += [f"without a value: {_listed(gone)}"] if gone else []
     return "; ".join(words) or "none"
 
 
@@ -90,6 +95,8 @@ def _remarks(recording: RecordingPart) -> Markup:
     record = recording.integrity
     refused = [] if recording.usable else record["reasons"]
     parts = [paragraph(f"{recording.name} was refused: {reason}", "bad") for reason in refused]
+    if recording.moved is not None:
+        parts.append(paragraph(f"{recording.name} {moved_words(recording.kind, recording.moved)}.", "bad"))
     if recording.usable:
         parts += [paragraph(f"{recording.name}: {reason}", "warn") for reason in record["reasons"]]
     parts += [paragraph(f"{recording.name}: {text}", "note") for text in record["warnings"]]
