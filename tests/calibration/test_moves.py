@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vgyro.calibration.moves import find_moves, gyro_windows, runs_of, window_length
+from vgyro.calibration.moves import find_moves, gyro_windows, noise_level, runs_of, seems_to_move, window_length
 from vgyro.config import RestOptions
 
 RATE_HZ, SIGMA = 100.0, 0.05
@@ -16,6 +16,37 @@ def moving(rate: np.ndarray, axes: str | None = None, scale: float = 1.0, rate_h
     windows = [gyro_windows(column, length) for column in (rate / scale).T]
     found = find_moves(windows, list(axes or "z" * rate.shape[1]), [scale] * rate.shape[1], OPTIONS)
     return [(start * length / rate_hz, stop * length / rate_hz) for start, stop in runs_of(found)]
+
+
+def differences(rate: np.ndarray) -> dict:
+    """Noise levels of gyros of one axis from the difference of each and the next one."""
+    length = window_length(RATE_HZ, OPTIONS)
+    pairs = [(gyro_windows(one, length), gyro_windows(one - other, length))
+             for one, other in zip(rate.T, np.roll(rate, -1, axis=1).T, strict=True)]  # fmt: skip
+    found = {place: noise_level(*pair) for place, pair in enumerate(pairs)}
+    return {place: level for place, level in found.items() if level is not None}
+
+
+@pytest.mark.parametrize(("size", "found"), [(10.0, True), (0.25, False)])
+def test_a_board_that_never_rests(size, found):
+    # A sinusoid of 0.7 Hz, 200 and 5 times the noise of a sample; the difference of two gyros has √2 times that noise.
+    rate = in_hand(white(60, 3), 0, 60, size=size)
+    levels = differences(rate)
+    assert bool(levels) == found
+    windows = [gyro_windows(column, window_length(RATE_HZ, OPTIONS)) for column in rate.T]
+    assert find_moves(windows, ["z"] * 3, [1.0] * 3, OPTIONS, levels).all() == found
+
+
+def test_noise_that_is_common_and_smooth_has_no_level_of_its_own():
+    # Low-passed noise is smooth, too, but no gyro's is another's; common vibration is quick.
+    time = np.arange(round(600 * RATE_HZ)) / RATE_HZ
+    kernel = np.ones(60) / np.sqrt(60)
+    own = np.stack([np.convolve(column, kernel, "same") for column in white(600, 3).T], axis=1)
+    common = np.convolve(white(600, 1, 5)[:, 0], kernel, "same")[:, None]
+    assert all(seems_to_move(gyro_windows(column, 100)) for column in own.T)
+    assert differences(own) == {}
+    assert differences(own + 3 * common) == {}
+    assert differences(white(600, 3) + np.sin(2 * np.pi * 33 * time)[:, None]) == {}
 
 
 def white(seconds: float, gyros: int, seed: int = 1, rate_hz: float = RATE_HZ) -> np.ndarray:

@@ -22,7 +22,9 @@ def board() -> dict:
     return {"name": "b", "title": "b", "rate_hz": 200.0, "frame": frame, "gyros": gyros}
 
 
-def run(folder: Path, value: np.ndarray, kind: str = "static", fusion: dict | None = None) -> tuple[dict, dict]:
+def run(
+    folder: Path, value: np.ndarray, kind: str = "static", fusion: dict | None = None, moved: bool = False
+) -> tuple[dict, dict]:
     """Table and summary for the correlation matrix `value`, limits 0.03 off; gyros of 0.1 deg/s/√Hz."""
     flat = dict.fromkeys(GYROS, 0.1)
     noise = {"gyros": GYROS, "arw": flat, "rrw": flat, "rrw_source": dict.fromkeys(GYROS, "fitted")}
@@ -33,7 +35,11 @@ def run(folder: Path, value: np.ndarray, kind: str = "static", fusion: dict | No
     for name, off in (("correlation", 0.0), ("low", -0.03), ("high", 0.03)):
         table[name] = [float(value[place] + off * (place[0] != place[1])) for place in pairs]
     write_table(folder / "correlation.parquet", table, "correlation", Provenance({}, "", ""))
-    inputs = {"noise": [folder / "noise" / "z.json"], "correlation": [folder / "correlation.parquet"]}
+    still = {"time": np.arange(3) / 200, "segment": np.zeros(3, np.int32), "at_rest": np.full(3, kind == "static")}
+    extra = {"rate_hz": 200.0, **({"moved": {"share": 0.5, "stretches": [[0.0, 0.1]]}} if moved else {})}
+    write_table(folder / "rates.parquet", still, "rates", Provenance({}, "", ""), extra)
+    inputs = {"rates": [folder / "rates.parquet"], "noise": [folder / "noise" / "z.json"]}
+    inputs["correlation"] = [folder / "correlation.parquet"]
     options = {"board": board(), "axis": "z", "kind": kind, "analysis": {"fusion": fusion or {}}}
     out = folder / "more_gyros.parquet"
     more_gyros.main(Task(inputs, {"more_gyros": out}, options, "code"))
@@ -65,6 +71,9 @@ def test_bandwidth_in_motion(tmp_path):
     still, _ = run(tmp_path, MATRIX)
     moving, _ = run(tmp_path, MATRIX, kind="sinusoid")
     np.testing.assert_allclose(moving["sd"] / still["sd"], np.sqrt(5))
+    # A static recording in which the board moved is none.
+    moved, _ = run(tmp_path, MATRIX, moved=True)
+    np.testing.assert_allclose(moved["sd"], moving["sd"])
     # Expected: 6 °/√h is 0.1 deg/s/√Hz, as measured here.
     given, _ = run(tmp_path, MATRIX, fusion={"arw_deg_rt_h": 12.0})
     np.testing.assert_allclose(given["arw"] / still["arw"], 2)

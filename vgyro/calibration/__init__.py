@@ -2,7 +2,16 @@
 
 from vgyro.calibration.convert import clipped_samples, fit_phase, sinusoid, to_rates
 from vgyro.calibration.figures import BELOW, FIGURES, MISSING, VALUE, Finding, figure_record, not_measured
-from vgyro.calibration.moves import GyroWindows, find_moves, gyro_windows, runs_of, widened, window_length
+from vgyro.calibration.moves import (
+    GyroWindows,
+    find_moves,
+    gyro_windows,
+    noise_level,
+    runs_of,
+    seems_to_move,
+    widened,
+    window_length,
+)
 from vgyro.calibration.plateaus import DIRECTION_NAMES, PlateauMeans, average_plateaus, find_plateaus
 from vgyro.calibration.repeatability import bias_repeatability, scale_repeatability
 from vgyro.calibration.rest import find_rest
@@ -45,11 +54,13 @@ __all__ = [
     "fit_phase",
     "fit_scale_factor",
     "gyro_windows",
+    "noise_level",
     "nominal_fit",
     "not_measured",
     "runs_of",
     "scale_repeatability",
     "scale_temperature",
+    "seems_to_move",
     "self_heating",
     "sinusoid",
     "smooth_temperature",

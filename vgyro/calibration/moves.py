@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ SHORTEST = 2  # windows: what is in one alone is a knock, or a damaged row of th
 NEAR = 5  # windows on each side of a motion, from which its change of level is read
 AGREE = 0.3  # of a step of the rate: gyros that see less or more of it see something else
 QUIET_QUANTILE = 0.1
+COMMON = 10.0  # so many times quieter is a difference of two gyros than what both see; noise has no such correlation
 STEPS = 0.5  # steps of a quantised channel: a value that flips between two of them has no larger deviation
 SMOOTH = 3.0  # a deviation so many times that of adjacent samples is motion, not noise
 WINDOWS_AT_ONCE = 1 << 12
@@ -88,12 +89,18 @@ def _moments(part: np.ndarray) -> np.ndarray:
 
 
 def find_moves(
-    gyros: Sequence[GyroWindows], axes: Sequence[str], scales: Sequence[float], options: RestOptions | None = None
+    gyros: Sequence[GyroWindows],
+    axes: Sequence[str],
+    scales: Sequence[float],
+    options: RestOptions | None = None,
+    levels: Mapping[int, float] | None = None,
 ) -> np.ndarray:
     """True [W] in the windows in which the board moves.
 
     gyros  : of the whole board;  axes : of each;  scales : deg/s a unit of each, with its sign
     options : window_s, min_duration_s, guard_s, threshold
+    levels  : place of a gyro → its level without the motion that it shares with another one, in its own unit (see
+              noise_level); None: no gyro seems to move all the time
     A gyro moves in a window where its deviation is more than `threshold` times its quiet level (the lowest tenth of all
     windows, or half a step of its channel). The board moves where most gyros of one axis do, two at least; about an
     axis with one gyro, where another gyro of the board moves with it; on a board of one gyro, where what it sees is
@@ -102,15 +109,15 @@ def find_moves(
     A stretch between two motions that begins with a step of the common rate, and so differs from where the board stood
     for most of the time by more than `threshold` times the noise of a sample, is a steady turn. A rest that would be
     shorter than min_duration_s, were guard_s cut from both its ends, counts as motion; nothing is cut here.
-    A board that moves from the first second to the last has no quiet level, and a turn that begins and ends more gently
-    than the noise is not seen.
+    Where less than a tenth is at rest there is no quiet level but that of `levels`. A turn that begins and ends more
+    gently than the noise is not seen.
     """
     options = options or RestOptions()
     known = [place for place, one in enumerate(gyros) if np.nansum(one.deviation) > 0]
     windows = len(gyros[0].mean) if gyros else 0
     if not known or windows < FEWEST_WINDOWS:
         return np.zeros(windows, dtype=bool)
-    quiet = {place: _quiet(gyros[place]) for place in known}
+    quiet = {place: (levels or {}).get(place, quiet_level(gyros[place])) for place in known}
     moves = {place: _moving(gyros[place], quiet[place], options.threshold) for place in known}
     if len(known) == 1:
         (only,) = known
@@ -132,7 +139,27 @@ def find_moves(
     return ~_long_runs(~moving, shortest)
 
 
-def _quiet(gyro: GyroWindows) -> float:
+def noise_level(gyro: GyroWindows, difference: GyroWindows) -> float | None:
+    """Level of a gyro without the motion that it shares with another gyro of its axis; None: it shares none.
+
+    difference : of the two, in the unit of the gyro
+    Where the quietest tenth of a gyro is smooth, and the difference more than COMMON times quieter, that was no noise.
+    """
+    level = quiet_level(difference)
+    return level if seems_to_move(gyro) and quiet_level(gyro) > COMMON * level else None
+
+
+def seems_to_move(gyro: GyroWindows) -> bool:
+    """Is even the quietest tenth of the windows smooth, as motion is and noise is not?"""
+    there = gyro.deviation > 0
+    if not there.any():
+        return False
+    smooth, rough = (np.quantile(values[there], QUIET_QUANTILE) for values in (gyro.deviation, gyro.roughness))
+    return bool(smooth > SMOOTH * rough)
+
+
+def quiet_level(gyro: GyroWindows) -> float:
+    """Deviation of the quietest tenth of the windows, or half a step of the channel."""
     deviation = gyro.deviation[gyro.deviation > 0]
     return max(float(np.quantile(deviation, QUIET_QUANTILE)), STEPS * gyro.step)
 

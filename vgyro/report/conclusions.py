@@ -16,7 +16,7 @@ from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, rows_of
 from vgyro.report.noise import OVERLAPPING
 from vgyro.report.numbers import percent, significant
 from vgyro.report.scale import nominal
-from vgyro.report.sentences import Conclusion, named
+from vgyro.report.sentences import Conclusion, moved_words, named
 
 BAD_FACTOR = 2.0
 BAD_ARW_FACTOR = 1.5
@@ -24,7 +24,8 @@ FEWEST_GYROS = 3
 SHORTEST_TAU = 1.0
 MOST_LOST = 1e-3
 MOST_UNFITTED = 0.01
-AT_REST_KINDS = ("static", "thermal", "free")
+FREE = "free"
+AT_REST_KINDS = ("static", "thermal", FREE)
 STILL_FALLS = "the curve still falls"
 BAD_RULE = (
     f"A gyro is called bad where, at rest, its 1σ or its Allan deviation at {SHORTEST_TAU:g} s or longer is more than "
@@ -46,12 +47,21 @@ class BadGyro:
 
 def conclude(dataset: DatasetPart) -> list[Conclusion]:
     """All sentences, the most important first."""
-    found = _gyro_sentences(dataset) + fault_sentences(dataset)
+    found = moved_sentences(dataset) + _gyro_sentences(dataset) + fault_sentences(dataset)
     for array in main_arrays(dataset):
         found += rest_sentences(dataset, array)
     found += motion_sentences(dataset)
     found += _arch_sentences(dataset)
     return found + limits(dataset)
+
+
+def moved_sentences(dataset: DatasetPart) -> list[Conclusion]:
+    """Recordings in which the board moved though they are declared to be at rest."""
+    return [
+        Conclusion(f"Recording {recording.name} {moved_words(recording.kind, recording.moved)}.", "bad", "recordings")
+        for recording in dataset.recordings
+        if recording.moved is not None
+    ]
 
 
 def at_rest(dataset: DatasetPart) -> list[ArrayPart]:
@@ -60,11 +70,15 @@ def at_rest(dataset: DatasetPart) -> list[ArrayPart]:
 
 
 def main_arrays(dataset: DatasetPart) -> list[ArrayPart]:
-    """One array an axis: of the first static recording, else thermal, else free; the longest of its kind."""
+    """One array an axis: of the first static recording, else thermal, else free; the longest of its kind.
+
+    A recording in which the board moved is as a free one, whatever it is declared to be.
+    """
 
     def rank(array: ArrayPart) -> tuple[int, float]:
         recording = dataset.recording(array.recording)
-        return AT_REST_KINDS.index(recording.kind), -float(recording.integrity.get("duration_s") or 0)
+        kind = recording.kind if recording.moved is None else FREE
+        return AT_REST_KINDS.index(kind), -float(recording.integrity.get("duration_s") or 0)
 
     candidates = {axis: [array for array in at_rest(dataset) if array.axis == axis] for axis in dataset.board.axes}
     return [min(arrays, key=rank) for arrays in candidates.values() if arrays]

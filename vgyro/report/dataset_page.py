@@ -96,7 +96,7 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
     bad = bad_gyros(dataset)
     best = _best_of_all(dataset)
     usable = [part for part in dataset.recordings if part.usable]
-    suspect = [part for part in usable if part.integrity.get("status") == "suspect"]
+    suspect = [part for part in usable if part.status == "suspect"]
     return {
         "dataset": dataset.name,
         "title": dataset.title,

@@ -48,6 +48,8 @@ class RatesPart:
     spans       : stretches at rest, (start, stop) s; empty where it always or never rests
     still       : share of the samples that are at rest
     temperature_time [P], temperatures {name: [P]} : some samples
+    moved       : where the board moved though the recording is declared to be at rest: share of it, stretches in s;
+                  None: it did not
     """
 
     time: np.ndarray
@@ -58,6 +60,7 @@ class RatesPart:
     still: float
     temperature_time: np.ndarray
     temperatures: Table
+    moved: Record | None = None
 
 
 @dataclass(frozen=True)
@@ -183,6 +186,17 @@ class RecordingPart:
     @property
     def usable(self) -> bool:
         return self.integrity.get("status") != "refused"
+
+    @property
+    def moved(self) -> Record | None:
+        """Where the board moved though the recording is declared to be at rest; None: it did not."""
+        return None if self.rates is None else self.rates.moved
+
+    @property
+    def status(self) -> str:
+        """good, suspect or refused: by its frames, and by whether it is what it is declared to be."""
+        status = str(self.integrity["status"])
+        return "suspect" if status == "good" and self.moved is not None else status
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.report.model import Value
-from vgyro.report.numbers import significant
+from vgyro.report.model import Record, Value
+from vgyro.report.numbers import percent, plain, significant
 from vgyro.report.tables import Tone
 
 MOST_NAMED = 6
+MOST_STRETCHES = 3
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,21 @@ class Conclusion:
     text: str
     tone: Tone = ""
     anchor: str = ""
+
+
+def moved_words(kind: str, moved: Record) -> str:
+    """Where a board moved that was to stand still, what its figures are then from, and what to do.
+
+    kind : as declared;  moved : share of the recording, stretches [[start s, stop s], …]
+    """
+    spans = [f"from {plain(start)} s to {plain(stop)} s" for start, stop in moved["stretches"]]
+    more = f" and {len(spans) - MOST_STRETCHES} times more" if len(spans) > MOST_STRETCHES else ""
+    times = ", ".join(spans[:MOST_STRETCHES])
+    from_what = "come from its rests alone" if moved["share"] < 1 else "are not known"
+    return (
+        f"is declared {kind}, but the board moved {times}{more} ({percent(moved['share'], 2)} of it): its figures at "
+        f"rest {from_what}; set kind: free"
+    )
 
 
 def named(gyros: Sequence[str]) -> str:

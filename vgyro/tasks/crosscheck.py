@@ -18,7 +18,7 @@ from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.crosscheck_rows import Row, columns_of, compare
 from vgyro.tasks.crosscheck_windows import window_rows
 from vgyro.tasks.fusion_inputs import in_motion, read_noise
-from vgyro.tasks.rates_file import read_array
+from vgyro.tasks.rates_file import has_moved, read_array
 
 FILTER_SAMPLES = 2000
 FILTER_TOLERANCE = 1e-9  # of the largest rate
@@ -53,7 +53,8 @@ def filter_rows(task: Task, gyros: list[str]) -> Iterator[Row]:
         rate = _first_samples(task, gyros)
         ours = read_rows(task.input("fused"), [name], 0, len(rate))[name]
         at_rest = read_columns(task.input("rates"), ["at_rest"])["at_rest"].astype(bool)
-        parameters = FilterParameters.of(fusion, in_motion(task.options["kind"], at_rest))
+        moving = in_motion(task.options["kind"], at_rest, has_moved(task.input("rates")))
+        parameters = FilterParameters.of(fusion, moving)
         R = read_noise(task.input("noise"), gyros).with_arw(parameters.arw).R
         q = parameters.q or q_for_bandwidth(information(R), parameters.bandwidth_hz, tau)
         theirs = printed_filter(rate, float(read_metadata(task.input("rates"))["rate_hz"]), R, q, tau)

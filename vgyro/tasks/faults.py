@@ -51,7 +51,7 @@ def main(task: Task) -> None:
         file = read_array(task.input("rates"), names, task.options["axis"])
         array = array_of(file, read_temperature(file, thermometers(board, names)))
         zero = zero_counts(file.path, gyros, task.inputs.get("calibration", []))
-        search = search_faults(array, options, zero, in_hand=task.options["kind"] == "free")
+        search = search_faults(array, options, zero, in_hand=task.options["kind"] == "free" or file.moved)
         note, events = search.note, search.events
         times = times_at(file.path, [sample for one in events for sample in (one.start, one.stop - 1)])
         ends = [one.stop == len(array.rate) for one in events]

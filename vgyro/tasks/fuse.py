@@ -46,7 +46,7 @@ def main(task: Task) -> None:
     with kept_columns(task.output("fused")) as fused:
         rows = [] if note else run_all(opened, fused)
         write_columns(task, "fused", opened, fused, {**extra, **note})
-    why = why_not_moved(opened.injected_rate, task.options["kind"])
+    why = why_not_moved(opened.injected_rate, task.options["kind"], opened.file.moved)
     with kept_columns(task.output("moved")) as moved:
         rows = run_moved(opened, rows, moved, why)
         write_columns(
@@ -55,9 +55,9 @@ def main(task: Task) -> None:
     write_table(task.output("methods"), table_of(rows), "methods", task.provenance(), note)
 
 
-def why_not_moved(injected_rate: float | None, kind: str) -> str:
-    """Why no constant rate is added; "" where it is."""
-    if kind not in AT_REST:
+def why_not_moved(injected_rate: float | None, kind: str, moves: bool) -> str:
+    """Why no constant rate is added; "" where it is.  moves : the board moves though it is declared to be at rest"""
+    if kind not in AT_REST or moves:
         return "the recording is not one at rest"
     return "" if injected_rate is not None else "analysis.metrics.injected_rate is null"
 

@@ -84,7 +84,7 @@ def open_array(task: Task) -> OpenArray:
         temperature=read_temperature(file, thermometers(board, gyros)) if fusion.temperature == "auto" else None,
         stretch_time=stretch_times(file),
     )  # fmt: skip
-    moving = in_motion(task.options["kind"], file.at_rest)
+    moving = in_motion(task.options["kind"], file.at_rest, file.moved)
     parameters = FilterParameters.of(fusion, moving, block_hz, analysis.get("engine", "native"))
     return OpenArray(gyros, file, rates, parameters, fusion, volatility, task.options.get("injected_rate"))
 
@@ -104,9 +104,15 @@ def read_faults(path: Path, gyros: list[str], file: ArrayFile) -> list[FaultEven
     ]  # fmt: skip
 
 
-def in_motion(kind: str, at_rest: np.ndarray) -> bool:
-    """Does the board move in this recording, at least in part?"""
-    return kind not in AT_REST and not (kind == "free" and bool(at_rest.all()))
+def in_motion(kind: str, at_rest: np.ndarray, moved: bool) -> bool:
+    """Does the board move in this recording, at least in part?
+
+    moved : convert found motion in what is declared to be at rest. The samples at rest alone do not tell it: at rest,
+            too, those are left out at which a gyro is clipped.
+    """
+    if kind in AT_REST:
+        return moved
+    return not (kind == "free" and bool(at_rest.all()))
 
 
 def read_noise(path: Path, gyros: list[str]) -> ArrayNoise:

@@ -136,7 +136,8 @@ def still_figures(
     longest = np.bincount(sampling.stretch).max(initial=0)
     if longest < FEWEST_SAMPLES:
         return None
-    poses = task.options["kind"] == "free" and bool(sampling.stretch[-1] > 0)
+    # Between two rests the board may have been turned over.
+    poses = (task.options["kind"] == "free" or frame.moved) and bool(sampling.stretch[-1] > 0)
     filters = [one.low_pass for one in series]
     bandwidth_hz = common_bandwidth(filters, options.equal_bandwidth_hz)
     engine = task.options["analysis"].get("engine", "native")

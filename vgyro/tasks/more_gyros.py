@@ -9,19 +9,21 @@ import numpy as np
 
 from vgyro.board import Board
 from vgyro.config import FusionOptions
-from vgyro.dataset import AT_REST
 from vgyro.fusion import FilterParameters
 from vgyro.fusion.more_gyros import MeanCorrelation, analyse
-from vgyro.storage.tables import read_columns, write_table
+from vgyro.storage.tables import read_column, read_columns, write_table
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.fusion_inputs import read_noise
+from vgyro.tasks.fusion_inputs import in_motion, read_noise
+from vgyro.tasks.rates_file import has_moved
 
 
 def main(task: Task) -> None:
-    """inputs : noise, correlation;  outputs : more_gyros;  options : board, axis, kind, analysis.fusion"""
+    """inputs : rates, noise, correlation;  outputs : more_gyros;  options : board, axis, kind, analysis.fusion"""
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     options = FusionOptions.model_validate(task.options["analysis"].get("fusion", {}))
-    parameters = FilterParameters.of(options, task.options["kind"] not in AT_REST)
+    at_rest = read_column(task.input("rates"), "at_rest")
+    moving = in_motion(task.options["kind"], at_rest, has_moved(task.input("rates")))
+    parameters = FilterParameters.of(options, moving)
     noise = read_noise(task.input("noise"), gyros).with_arw(parameters.arw)
     correlation = read_correlation(task.input("correlation"), gyros)
     logging.info("mean correlation %g, %g to %g", correlation.value, correlation.low, correlation.high)

@@ -1,4 +1,4 @@
-"""Where a board that its manifest declares to be at rest moves: found in the frames, one channel in memory at a time."""
+"""Where a board moves that its manifest declares to be at rest: from the frames, one channel in memory at a time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 
 from vgyro.board import Gyro
-from vgyro.calibration import find_moves, gyro_windows, runs_of, widened, window_length
+from vgyro.calibration import (
+    GyroWindows,
+    find_moves,
+    gyro_windows,
+    noise_level,
+    runs_of,
+    seems_to_move,
+    widened,
+    window_length,
+)
 from vgyro.config import RestOptions
 from vgyro.dataset import AT_REST, Recording
 from vgyro.storage.tables import read_column
@@ -49,7 +58,8 @@ def moves_of(
     length = window_length(rate_hz, options)
     windows = [gyro_windows(read_column(frames, gyro.field), length) for gyro in gyros]
     scales = [gyro.sign * gyro.scale for gyro in gyros]
-    moving = find_moves(windows, [gyro.axis for gyro in gyros], scales, options)
+    levels = levels_of(frames, gyros, windows, length)
+    moving = find_moves(windows, [gyro.axis for gyro in gyros], scales, options, levels)
     if not moving.any():
         return None
     guarded = widened(moving, math.ceil(options.guard_s / options.window_s))
@@ -63,3 +73,25 @@ def moves_of(
         tuple(float(time[stop - 1]) + 1 / rate_hz for _, stop in edges),
         share,
     )
+
+
+def levels_of(frames: Path, gyros: Sequence[Gyro], windows: Sequence[GyroWindows], length: int) -> dict[int, float]:
+    """Place → noise level of the gyros that seem to move all the time, from differences within their axis.
+
+    Two channels are read at a time, and none where no gyro seems to move: so for every recording that is at rest.
+    """
+    levels: dict[int, float] = {}
+    for axis in dict.fromkeys(gyro.axis for gyro in gyros):
+        members = [place for place, gyro in enumerate(gyros) if gyro.axis == axis and seems_to_move(windows[place])]
+        if len(members) < 2:
+            continue
+        for place, other in zip(members, [*members[1:], members[0]], strict=True):
+            own, beside = gyros[place], gyros[other]
+            difference = read_column(frames, own.field, float)
+            difference -= read_column(frames, beside.field, float) * (
+                beside.sign * beside.scale / (own.sign * own.scale)
+            )
+            level = noise_level(windows[place], gyro_windows(difference, length))
+            if level is not None:
+                levels[place] = level
+    return levels

@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from vgyro.metrics import (
 )
 from vgyro.storage.tables import write_json
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.rates_file import ArrayFile, FileColumns, read_array
+from vgyro.tasks.rates_file import ArrayFile, FileColumns, has_moved, read_array
 
 ENOUGH_REST_S = 10.0
 LONG_ENOUGH = 30  # samples
@@ -48,11 +49,14 @@ class ArrayNoiseRecord:
 
 
 def main(task: Task) -> None:
-    """inputs : rates (of the recording to take it from);  outputs : noise;  options : axis, board, analysis.metrics"""
+    """inputs : rates, of the recordings to take it from, the first choice first;  outputs : noise
+
+    options : axis, board, analysis.metrics
+    """
     options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
     engine = task.options["analysis"].get("engine", "native")
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
-    path = task.inputs["rates"][0]
+    path = source_of(task.inputs["rates"])
     frame = read_array(path, [], task.options["axis"])
     places = [(path, gyro) for gyro in gyros]
     sampling = frame.rest_sampling(options.most_lost_s)
@@ -65,6 +69,11 @@ def main(task: Task) -> None:
     if found is None:
         found = noise_in_motion(FileColumns(places), frame, engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
+
+
+def source_of(choices: Sequence[Path]) -> Path:
+    """The first recording that is what it is declared to be; where the board moved in all of them, the first."""
+    return next((path for path in choices if not has_moved(path)), choices[0])
 
 
 def rests_enough(sampling: Sampling) -> bool:

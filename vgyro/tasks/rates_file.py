@@ -37,6 +37,11 @@ class ArrayFile:
     axis: str
 
     @property
+    def moved(self) -> bool:
+        """Did the board move in a recording that is declared to be at rest? As convert found."""
+        return has_moved(self.path)
+
+    @property
     def time(self) -> np.ndarray:
         """Time of each sample [T], s. Read from the file."""
         return read_column(self.path, "time", float)
@@ -64,6 +69,11 @@ class ArrayFile:
         """When the samples at rest were taken; what moves, or was clipped, counts as lost."""
         sampling = self.sampling(most_lost_s)
         return sampling if self.at_rest.all() else sampling.without(~self.at_rest)
+
+
+def has_moved(path: Path) -> bool:
+    """Did the board move in a recording that is declared to be at rest? As convert wrote into rates.parquet."""
+    return "moved" in read_metadata(path)
 
 
 def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:

@@ -16,7 +16,8 @@ TEMPERATURE = "temp_"
 
 def read_rates(path: Path, gyros: list[str]) -> RatesPart:
     """The curves of a recording; gyros that the table lacks are left out."""
-    known = list(read_metadata(path)["units"])
+    metadata = read_metadata(path)
+    known = list(metadata["units"])
     gyros = [name for name in gyros if name in known]
     temperatures = [name for name in known if name.startswith(TEMPERATURE)]
     reference = [REFERENCE] if REFERENCE in known else []
@@ -52,6 +53,7 @@ def read_rates(path: Path, gyros: list[str]) -> RatesPart:
         still=float(at_rest.mean()) if samples else 1.0,
         temperature_time=some["time"],
         temperatures={name.removeprefix(TEMPERATURE): some[name] for name in temperatures},
+        moved=metadata.get("moved"),
     )
 
 

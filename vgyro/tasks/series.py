@@ -14,6 +14,7 @@ from vgyro.config import VolatilityOptions
 from vgyro.errors import DataError
 from vgyro.storage.tables import ROW_GROUP, RowStream, TableWriter, read_batches, read_metadata
 from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.rates_file import has_moved
 from vgyro.volatility.blocks import BlockMeans, Blocks, RunFinder, Runs, block_length
 
 IN_MOTION = ("constant", "random", "sinusoid")
@@ -32,7 +33,8 @@ def main(task: Task) -> None:
         raise DataError("rates without a sample rate", str(path), "run the stage `convert` again")
     length = block_length(float(rate_hz), options.rate_hz)
     share = share_at_rest(path)
-    whole = task.options.get("kind") in IN_MOTION or share == 0
+    # What is declared to be at rest is no motion to analyse where nothing of it is.
+    whole = task.options.get("kind") in IN_MOTION or (share == 0 and not has_moved(path))
     runs = find_runs(path, float(rate_hz), length, whole)
     found = stretches_of(blocks_of(path, runs, []))
     use = "in motion, all of it used" if whole else f"{share:.1%} of the recording at rest and used"

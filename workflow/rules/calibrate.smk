@@ -49,7 +49,7 @@ rule convert:
 rule noise:
     """White noise, random walk and correlation of an axis' gyros: what the filters are designed from."""
     input:
-        rates=noise_source,
+        rates=noise_choices,
     output:
         noise="results/{dataset}/noise/{axis}.json",
     log:
@@ -63,5 +63,5 @@ rule noise:
         options=stage("board", "metrics"),
         code=code("noise"),
     shell:
-        "python -m vgyro.tasks.noise --input rates {input.rates} --output noise {output.noise}"
+        "python -m vgyro.tasks.noise --input rates {input.rates:q} --output noise {output.noise}"
         " --options {params.options:q} --code {params.code} --log {log}"

@@ -274,8 +274,11 @@ def calibration_references(wildcards):
     return [path for name in names for path in reference_path(wildcards.dataset, name)]
 
 
-def noise_source(wildcards):
-    """Rates of the recording that tells each gyro's noise: at rest if there is one, else the longest."""
+def noise_choices(wildcards):
+    """Rates of the recordings that may tell each gyro's noise, the first choice first: those at rest, else the longest.
+
+    Whether the board stood still in them shows only when they are converted; the stage `noise` chooses.
+    """
     names = usable(wildcards.dataset)
     order = {kind: rank for rank, kind in enumerate(("static", "thermal", "free"))}
     about = screened(wildcards.dataset)["recordings"]
@@ -285,7 +288,16 @@ def noise_source(wildcards):
             -about[name]["duration_s"],
         )
     )
-    return [f"results/{wildcards.dataset}/{name}/rates.parquet" for name in names[:1]]
+    resting = [name for name in names if kind_of(wildcards.dataset, name) in order]
+    return [
+        f"results/{wildcards.dataset}/{name}/rates.parquet"
+        for name in resting or names[:1]
+    ]
+
+
+def noise_source(wildcards):
+    """Rates of the recording that is the first choice, or none."""
+    return noise_choices(wildcards)[:1]
 
 
 def reference_path(dataset, recording):

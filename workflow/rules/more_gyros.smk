@@ -1,6 +1,7 @@
 rule more_gyros:
     """What a larger array of the same kind of gyro would bring."""
     input:
+        rates="results/{dataset}/{recording}/rates.parquet",
         noise="results/{dataset}/noise/{axis}.json",
         correlation="results/{dataset}/{recording}/{axis}/correlation.parquet",
     output:
@@ -16,6 +17,6 @@ rule more_gyros:
         options=stage("board", "fusion"),
         code=code("more_gyros"),
     shell:
-        "python -m vgyro.tasks.more_gyros --input noise {input.noise} --input correlation {input.correlation}"
+        "python -m vgyro.tasks.more_gyros --input rates {input.rates} --input noise {input.noise} --input correlation {input.correlation}"
         " --output more_gyros {output.more_gyros}"
         " --options {params.options:q} --code {params.code} --log {log}"
