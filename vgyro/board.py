@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -15,6 +16,13 @@ TYPE_BYTES: dict[str, int] = {
     "f32": 4, "f64": 8,
 }  # fmt: skip
 ByteOrder = Literal["big", "little"]
+
+
+def hexadecimal(text: str) -> bytes:
+    """The bytes of a text such as EB 90.  raises : ValueError in words for people"""
+    if re.fullmatch(r"\s*(?:[0-9A-Fa-f]{2}\s*)*", text) is None:
+        raise ValueError(f"expected bytes of two hexadecimal digits each, such as EB 90; found {text!r}")
+    return bytes.fromhex(text)
 
 
 class ChannelField(StrictModel):
@@ -75,8 +83,15 @@ class BinaryFrame(StrictModel):
     @field_validator("sync")
     @classmethod
     def _hexadecimal(cls, value: str) -> str:
-        if not bytes.fromhex(value):
-            raise ValueError("sync needs at least one byte")
+        if not hexadecimal(value):
+            raise ValueError("sync needs at least one byte, such as EB 90")
+        return value
+
+    @field_validator("constants")
+    @classmethod
+    def _all_hexadecimal(cls, value: dict[int, str]) -> dict[int, str]:
+        for text in value.values():
+            hexadecimal(text)
         return value
 
     @model_validator(mode="after")

@@ -12,6 +12,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
+from vgyro.yaml_words import spaceless
+
 Path = tuple[str | int, ...]
 
 _NOUNS = {
@@ -19,7 +21,8 @@ _NOUNS = {
     "float_type": "a number", "float_parsing": "a number", "finite_number": "a finite number",
     "bool_type": "true or false", "bool_parsing": "true or false", "string_type": "text",
     "list_type": "a list", "tuple_type": "a list", "dict_type": "keys and values", "model_type": "keys and values",
-    "model_attributes_type": "keys and values",
+    "model_attributes_type": "keys and values", "mapping_type": "keys and values", "set_type": "a list",
+    "int_parsing_size": "a smaller whole number", "none_required": "nothing", "dataclass_type": "keys and values",
 }  # fmt: skip
 _KEY_ERRORS = {"missing", "union_tag_not_found", "union_tag_invalid", "extra_forbidden", "value_error"}
 _BOUNDS = {
@@ -110,9 +113,10 @@ def _message_of_key(error: Any, known: list[str]) -> str:
     if kind in {"missing", "union_tag_not_found"}:
         return "missing; this key is required"
     if kind == "extra_forbidden":
-        return "unknown key" + did_you_mean(str(step), known)
+        missing = spaceless(str(step))
+        return f"unknown key; {missing}" if missing else "unknown key" + did_you_mean(str(step), known)
     if kind == "value_error":
-        return str(error["msg"]).removeprefix("Value error, ")
+        return str(error["ctx"]["error"])
     tags = [tag.strip(" '") for tag in error["ctx"]["expected_tags"].split(",")]
     tag = str(error["ctx"]["tag"])
     return f"expected one of {', '.join(tags)}; found {tag!r}{did_you_mean(tag, tags, listed=False)}"
@@ -137,8 +141,8 @@ def _noun(error: Any) -> str:
     if kind == "string_pattern_mismatch":
         pattern = error["ctx"]["pattern"]
         return _PATTERNS.get(pattern, f"text that matches {pattern}")
-    text = str(error["msg"]).removeprefix("Input should be ").removeprefix("a valid ")
-    return text[:1].lower() + text[1:]
+    # What pydantic says is for programmers; no field of ours comes here as far as is known.
+    return "another kind of value"
 
 
 def _literals(error: Any) -> list[str]:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from vgyro import complaints
 from vgyro.complaints import did_you_mean as did_you_mean
 from vgyro.errors import ConfigError
+from vgyro.yaml_words import spaceless, yaml_fault
 
 Model = TypeVar("Model", bound="StrictModel")
 Path = tuple[str | int, ...]
@@ -63,7 +64,8 @@ def parse_model(text: str, model: type[Model], source: str, context: Mapping[str
     """
     data, lines = parse_yaml(text, source)
     if not isinstance(data, dict):
-        raise InvalidFile([Problem(source, 1, "", "expected keys and values (a YAML mapping)")])
+        missing = spaceless(data) if isinstance(data, str) else ""
+        raise InvalidFile([Problem(source, 1, "", missing or "expected keys and values, such as `title: my bench`")])
     try:
         return model.model_validate(data, context=dict(context or {}))
     except ValidationError as error:
@@ -78,12 +80,12 @@ def parse_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         data = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        reason = getattr(error, "problem", None) or "not readable as YAML"
-        raise InvalidFile([Problem(source, mark.line + 1 if mark else 1, "", f"not valid YAML: {reason}")]) from None
+        line, message = yaml_fault(error, text)
+        raise InvalidFile([Problem(source, line, "", message)]) from None
     except ValueError as error:
         # PyYAML's own conversion of dates and numbers, such as 2026-13-45.
-        raise InvalidFile([Problem(source, 1, "", f"not valid YAML: {error}")]) from None
+        line, message = yaml_fault(error, text)
+        raise InvalidFile([Problem(source, line, "", message)]) from None
     lines: dict[Path, int] = {(): 1}
     problems: list[Problem] = []
     if node is not None:
