@@ -12,7 +12,8 @@ import numpy as np
 
 from vgyro.board import BinaryFrame, parse_board
 from vgyro.engine.frames import Column
-from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, weights
+from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, text, weights
+from vgyro.engine.text import PAD, Field, LineForm
 
 BOARDS = Path(__file__).parents[3] / "config/boards"
 SEED = 20150612
@@ -95,6 +96,7 @@ def results() -> dict[str, object]:
         found[f"allan losses {kind}"] = allan.differences_over_losses(*sums, np.array([0, 20, 3062]), factors, 3, kind)
     found["lag products"] = allan.lag_products(rate[:, 2].copy(), factors, edges)
     found["frames"] = frames_results(rng)
+    found["text"] = text_results(rng)
     return found
 
 
@@ -115,6 +117,26 @@ def frames_results(rng: np.random.Generator) -> list[object]:
     time = np.arange(500) / 200
     found.append(frames.longest_run(np.repeat(np.arange(50, dtype=np.int16), 10), time, 0.0, 0.01))
     found.append(frames.Finder(frame).find(np.empty(0, dtype=np.uint8)))
+    return found
+
+
+def text_results(rng: np.random.Generator) -> list[object]:
+    """Rows of lines of every kind of cell, as they are and with bytes changed at random."""
+    fields = (Field("date"), Field("number"), Field("words"), Field("number", b"gx:"), Field("integer"), Field("hex"))
+    lines = b'2026-02-28 23:59:55.123Z,1.25e3,"a b",gx:-0.5,1700000000123456789,0xFF\n' * 50
+    damaged = np.frombuffer(lines * 20, dtype=np.uint8).copy()
+    at = rng.integers(0, len(damaged) - 1, 2000)
+    damaged[at] = rng.choice(np.frombuffer(b'\n\n,,"\r \t*-+.eE:019xgT\xff\x00', dtype=np.uint8), len(at))
+    found: list[object] = []
+    for form in (
+        LineForm(fields), LineForm((Field("number"),) * 3, b" "), LineForm((Field("day"), Field("skip")), lead=b",1"),
+        LineForm((Field("skip"), Field("number", b"gx:")), word=b"2026", checksum=True), LineForm(fields, eol=b"\r"),
+    ):  # fmt: skip
+        for content in (np.frombuffer(lines, dtype=np.uint8), damaged, damaged[-7:], damaged[-1:]):
+            # Exactly as many bytes as may be read.
+            data = np.concatenate([content, np.full(1 + PAD, ord("7"), dtype=np.uint8)])
+            data[len(content)] = form.eol[0]
+            found.append(tuple(text.Parser(form).parse(data, len(content) + 1, 500)))
     return found
 
 

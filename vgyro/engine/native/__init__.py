@@ -8,6 +8,7 @@ kalman  : filters and smoother of a scalar rate
 statespace : likelihood and smoother of a state space that one series measures
 frames  : frames of a serial dump: synchronisation and checksums
 adaptive : extended Kalman filter of scale errors, bank of filters
+text    : lines of a text log: cells, numbers and stamps
 
 Each is a module, loaded at first use: `vgyro.engine.get("native").garch.fit_garch(...)`. The kernels are compiled
 for several instruction sets and chosen at run time; their results have the same bits on each, and for any number of
@@ -25,7 +26,7 @@ from vgyro.errors import EngineError
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
-    from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, statespace, weights  # noqa: F401
+    from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights  # noqa: F401
 
     # Compiled: they have no Python source to read types from.
     _adaptive: Any
@@ -36,9 +37,10 @@ if TYPE_CHECKING:
     _garch: Any
     _kalman: Any
     _statespace: Any
+    _text: Any
     _weights: Any
 
-MODULES = ("adaptive", "garch", "dcc", "weights", "allan", "kalman", "statespace", "frames")
+MODULES = ("adaptive", "garch", "dcc", "weights", "allan", "kalman", "statespace", "frames", "text")
 
 
 def __getattr__(name: str) -> ModuleType:

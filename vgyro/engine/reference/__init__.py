@@ -8,6 +8,7 @@ kalman  : filters by filterpy
 statespace : likelihood and smoother of a state space by filterpy
 frames  : frames of a serial dump by NumPy
 adaptive : extended Kalman filter and bank of filters by filterpy
+text    : lines of a text log by Python
 
 Each is a module, loaded at first use: `vgyro.engine.get("reference").garch.fit_garch(...)`.
 """
@@ -20,9 +21,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
-    from vgyro.engine.reference import adaptive, allan, dcc, frames, garch, kalman, statespace, weights  # noqa: F401
+    from vgyro.engine.reference import adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights  # noqa: F401
 
-MODULES = ("adaptive", "garch", "dcc", "weights", "allan", "kalman", "statespace", "frames")
+MODULES = ("adaptive", "garch", "dcc", "weights", "allan", "kalman", "statespace", "frames", "text")
 
 
 def __getattr__(name: str) -> ModuleType:
