@@ -28,7 +28,7 @@ from vgyro.storage.logs.opened import (
     reason,
     until_damage,
 )  # fmt: skip
-from vgyro.storage.logs.table import BadLine, LogColumn, LogTable, Rows
+from vgyro.storage.logs.table import Account, BadLine, LogColumn, LogTable, Rows
 
 MESSAGES = 1 << 15
 MOST_BAD = 1000
@@ -77,14 +77,12 @@ def open_log(path: Path) -> OpenedLog:
                 topics[table.name] = topic
                 tables.append(table)
 
-    def stream(table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def stream(opened: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
         return _stream(path, kind, topics[table.name], columns, opened)
 
     if kind == MCAP and whole_mcap(path) is not None:
         notes.append("the file breaks off: it is read up to its last whole chunk")
-    opened = OpenedLog(path, "bag", tuple(tables), stream, errors=errors)
-    opened.account.notes += notes
-    return opened
+    return OpenedLog(path, "bag", tuple(tables), stream, Account(notes=notes), errors=errors)
 
 
 def _errors() -> Errors:

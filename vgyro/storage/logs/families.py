@@ -58,9 +58,11 @@ def _open_text(path: Path, log: Log, engine: str) -> LogFile:
 
 
 def _is_text(head: bytes, _: Path) -> bool:
+    if named(head) is not None:
+        return False
     from vgyro.storage.logs import text
 
-    return named(head) is None and text.looks_like_text(head)
+    return text.looks_like_text(head)
 
 
 def _is_bag(head: bytes, path: Path) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.storage.logs.arrays import Variable, blocks_of, stream, tables_of
 from vgyro.storage.logs.opened import OpenedLog, check_not_empty, needed, reading, too_many
-from vgyro.storage.logs.table import LogTable, Rows
+from vgyro.storage.logs.table import Account, LogTable, Rows
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 USER_BLOCKS = (0, 512, 1024, 2048, 4096)
@@ -53,13 +53,11 @@ def open_log(path: Path) -> OpenedLog:
         objects = any("object" in note for note in notes)
         raise DataError(what, str(path), AS_STRUCT if objects else "save vectors and matrices of numbers")
 
-    def rows(table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def rows(_: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
         leaves = {leaf.column.name: leaf for leaf in made[table.name][1]}
         return stream([leaves[name] for name in columns])
 
-    opened = OpenedLog(path, "matlab", tuple(table for table, _ in made.values()), rows)
-    opened.account.notes += notes
-    return opened
+    return OpenedLog(path, "matlab", tuple(table for table, _ in made.values()), rows, Account(notes=notes))
 
 
 def _variables_v5(path: Path, notes: list[str]) -> list[Variable]:

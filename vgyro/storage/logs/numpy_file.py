@@ -16,7 +16,7 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.storage.logs.arrays import Leaf, Variable, blocks_of, stream, tables_of
 from vgyro.storage.logs.opened import WIDEST, OpenedLog, check_not_empty, reading, too_many
-from vgyro.storage.logs.table import LogTable, Rows
+from vgyro.storage.logs.table import Account, LogTable, Rows
 
 ZIP = b"PK\x03\x04"
 ERRORS = (zipfile.BadZipFile, zipfile.LargeZipFile)
@@ -64,15 +64,12 @@ def _open_npy(path: Path) -> OpenedLog:
 
 
 def _opened(path: Path, made: dict[str, tuple[LogTable, list[Leaf]]], notes: list[str]) -> OpenedLog:
-    def rows(table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def rows(_: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
         leaves = {leaf.column.name: leaf for leaf in made[table.name][1]}
         return stream([leaves[name] for name in columns])
 
-    if not made and notes:
-        raise DataError("; ".join(["holds no table of numbers", *notes]), str(path), "save plain arrays of numbers")
-    opened = OpenedLog(path, "numpy", tuple(table for table, _ in made.values()), rows, errors=ERRORS)
-    opened.account.notes += notes
-    return opened
+    tables = tuple(table for table, _ in made.values())
+    return OpenedLog(path, "numpy", tables, rows, Account(notes=notes), errors=ERRORS)
 
 
 class _Header(NamedTuple):

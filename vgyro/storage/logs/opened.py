@@ -106,14 +106,14 @@ class Unique:
         return free
 
 
-Stream = Callable[[LogTable, Sequence[str]], Iterable[Rows]]
+Stream = Callable[["OpenedLog", LogTable, Sequence[str]], Iterable[Rows]]
 
 
 @dataclass
 class OpenedLog:
     """A log of any family (LogFile): what is in it, and a function that streams one table.
 
-    path   : as people know it;  stream : (table, names of columns) → rows, both checked
+    path   : as people know it;  stream : (the log, table, names of columns) → rows; both are checked before
     broken : what a library said where a table could not be read on
     errors : a library's own errors, beside DAMAGE
     """
@@ -142,7 +142,7 @@ class OpenedLog:
     def _read(self, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
         self.broken.clear()
         given = 0
-        for rows in until_damage(iter(self.stream(table, columns)), self.errors, self.broken):
+        for rows in until_damage(iter(self.stream(self, table, columns)), self.errors, self.broken):
             given += rows.batch.num_rows
             self.account.rows += rows.batch.num_rows
             self.account.bad += len(rows.bad)

@@ -53,7 +53,7 @@ def open_log(path: Path) -> OpenedLog:
     table = LogTable("", tuple(leaf.column for leaf in leaves), count)
     tables = (table,) if any(column.kind == "number" for column in table.columns) else ()
 
-    def stream(_: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def stream(_: OpenedLog, __: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
         return _stream(path, schema, [found[name] for name in columns])
 
     return OpenedLog(path, "parquet", tables, stream)

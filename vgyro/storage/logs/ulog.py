@@ -24,7 +24,7 @@ from vgyro.storage.logs.opened import (
     reading,
     rows_at_a_time,
 )  # fmt: skip
-from vgyro.storage.logs.table import LogColumn, LogTable, Rows
+from vgyro.storage.logs.table import Account, LogColumn, LogTable, Rows
 from vgyro.storage.logs.ulog_scan import Contents, copy_needed, fields_of, scan
 
 FIFO = {"sensor_gyro_fifo": "rad/s", "sensor_accel_fifo": "m/s²"}
@@ -70,12 +70,10 @@ def open_log(path: Path) -> OpenedLog:
             columns = _fifo_columns(name, fields) if fifo else _columns(name, fields)
             tables[title] = LogTable(title, columns, None if fifo else count)
 
-    def stream(table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def stream(opened: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
         return _stream(path, found, table, columns, opened)
 
-    opened = OpenedLog(path, "ulog", tuple(tables.values()), stream)
-    opened.account.notes += _notes(found)
-    return opened
+    return OpenedLog(path, "ulog", tuple(tables.values()), stream, Account(notes=_notes(found)))
 
 
 def _notes(found: Contents) -> list[str]:
