@@ -1,0 +1,221 @@
+"""What the stamps are: an even grid, arrival times of one, or uneven sampling. The test is in `judge`."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from vgyro.storage.clocks.windows import (
+    SHORT_STEPS,
+    forward_min,
+    midmean,
+    refined_period,
+    robust_sd,
+    rough_period,
+    without_long_steps,
+)
+
+FEW = 64  # rows; fewer tell little
+STRICTLY_EVEN = 0.005  # s.d. of the steps, periods: too little to accumulate within a few hundred rows
+COHERENT = 0.25  # s.d. of the steps up to which their phase is told apart
+SMALL_JITTER = 0.2  # r.m.s., periods: stamps are sampling times
+STEADY_JITTER = 0.1  # … up to here single steps tell a lost sample
+WALK = 0.35  # of the variance of independent steps
+COARSE = 0.02  # resolution, periods
+LONG_PAUSE = 5.0  # mean steps, and …
+BEYOND_USUAL = 2.0  # … times the 99.9th percentile of the steps
+HORIZON, LONGEST_HORIZON = 2048, 65_536  # rows over which an envelope is taken
+
+
+class Judgement(NamedTuple):
+    """What the stamps are, from the head of the recording.
+
+    period     : s
+    even       : on a grid
+    time_from  : "stamps", "line" or "envelope"
+    losses     : how they are found: by "steps" of the stamps, by the "level" of their envelope, by "pauses"
+    jitter     : s, r.m.s. about the grid; of the steps if uneven
+    resolution : s
+    horizon    : rows of the envelope
+    least_loss : samples that must be missing in a row to be seen
+    pause      : s, a longer step is an interruption, of uneven stamps
+    why        : a sentence
+    """
+
+    period: float
+    even: bool
+    time_from: Literal["stamps", "line", "envelope"]
+    losses: Literal["steps", "level", "pauses"]
+    jitter: float
+    resolution: float
+    horizon: int
+    least_loss: int
+    pause: float
+    why: str
+
+
+def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> Judgement | None:
+    """Decide what the stamps are.
+
+    1. Grid or walk. Stamps about an even grid, however late they arrive, stay near it: the variance of s[k+m]-s[k] does
+       not grow with m. The steps of a poll loop are independent: it grows as m. Lost samples shift a grid by whole
+       periods P, so that where steps spread by less than 0.25 P and bursts are absent, phases are compared: with
+       R(m) = |mean exp(2πi (s[k+m]-s[k])/P)|, a grid has R(m) = R(1), a walk R(1)^m. The smallest m (a power of two up
+       to 1024) with R(1)^m < 0.3 decides, at the geometric mean of both. Steps that spread by less than 0.005 P are
+       even. Else, the variances, the outer 0.5 % cut off: a walk if D(m) > 0.35 m D(1) at m = n/64, at least 8 and
+       at most 1024. With fewer than 64 rows only the spread counts: even below 0.28 P.
+    2. On a grid: stamps that are off by up to 0.25 to 1.2 steps of their resolution, and that above 0.02 P, are
+       rounded: sampled, time from the line through them. With less than 0.2 P r.m.s. of jitter, and less than 5 % of
+       steps below half a period, they are sampled: time is the stamp. Else they are arrival times, never earlier than
+       the sample: time is the lower envelope.
+    3. Off the grid: sampled unevenly, time is the stamp.
+
+    times      : float64 [n], s, wraps undone, repeats dropped
+    resolution : s, as the steps show it; finest: s, taken instead if that is but the period
+    meaning    : "auto"; "sampled" and "arrival" set the meaning, the test still says whether it is a grid
+    returns    : None if the times do not advance
+    """
+    if len(times) < 2:
+        return None
+    period, lag = rough_period(times)
+    if not (period > 0 and math.isfinite(1 / period)):
+        return None
+    if 0.95 < period / resolution < 1.05:
+        resolution = finest
+    steps = np.diff(times)
+    phase_sd, short = _step_phase(steps, period)
+    even, why = _on_grid(times, period, phase_sd, short)
+    if meaning == "arrival":
+        even = True
+    if not even:
+        return _uneven(times, period, resolution, why)
+    if len(times) >= FEW:
+        period = refined_period(times, period, lag)
+        phase_sd, short = _step_phase(steps, period)
+    jitter = phase_sd / math.sqrt(2) if short < SHORT_STEPS and phase_sd < math.inf else math.inf
+    spread = _local_range(times, period, resolution) / resolution
+    coarse = resolution > COARSE * period and 0.25 <= spread <= 1.2
+    time_from, why_time = _time_from(meaning, coarse, jitter, resolution / period)
+    steady = jitter < STEADY_JITTER and time_from != "envelope"
+    if not math.isfinite(jitter) or jitter > SMALL_JITTER:
+        jitter = _local_jitter(times, period)
+    horizon = _horizon(len(times), resolution / period)
+    least = 1 if steady else _least_loss(times, period, horizon)
+    why = f"{why}; {why_time}"
+    losses: Literal["steps", "level"] = "steps" if steady else "level"
+    return Judgement(period, True, time_from, losses, jitter * period, resolution, horizon, least, math.inf, why)
+
+
+def _step_phase(steps: np.ndarray, period: float) -> tuple[float, float]:
+    """S.d. of the steps modulo the period, in periods, and the share of steps below half a period."""
+    concentration = abs(np.exp(2j * np.pi * np.fmod(steps / period, 1.0)).mean())
+    spread = math.sqrt(max(0.0, -2 * math.log(concentration))) / (2 * math.pi) if concentration > 1e-9 else math.inf
+    return spread, float(np.mean(steps < 0.5 * period))
+
+
+def _on_grid(times: np.ndarray, period: float, phase_sd: float, short: float) -> tuple[bool, str]:
+    rows = len(times)
+    if rows < FEW:
+        spread = float(np.std(without_long_steps(np.diff(times)))) / period
+        even = min(spread, phase_sd) < 0.28
+        return even, f"{rows} rows: steps spread by {min(spread, phase_sd):.3g} periods"
+    if short < SHORT_STEPS and phase_sd <= STRICTLY_EVEN:
+        return True, f"steps spread by {phase_sd:.2g} periods"
+    if short < SHORT_STEPS and phase_sd < COHERENT:
+        return _by_phase(times, period)
+    return _by_variance(times)
+
+
+def _by_phase(times: np.ndarray, period: float) -> tuple[bool, str]:
+    def concentration(lag: int) -> float:
+        turns = np.fmod((times[lag:] - times[:-lag]) / period, 1.0)
+        return float(abs(np.exp(2j * np.pi * turns).mean()))
+
+    first = concentration(1)
+    lag, most = 2, max(2, min(1024, len(times) // 8))
+    while first**lag >= 0.3 and 2 * lag <= most:
+        lag *= 2
+    found, walk = concentration(lag), first**lag
+    text = f"phases over {lag} steps agree to {found:.2g} (a grid: {first:.2g}, independent steps: {walk:.2g})"
+    return found > math.sqrt(first * walk), text
+
+
+def _by_variance(times: np.ndarray) -> tuple[bool, str]:
+    lag = max(min(1024, len(times) // 64), min(8, len(times) // 8))
+
+    def variance(advance: np.ndarray) -> float:
+        low, high = np.quantile(advance, [0.005, 0.995])
+        return float(np.clip(advance, low, high).var())
+
+    one, many = variance(np.diff(times)), variance(times[lag:] - times[:-lag])
+    ratio = many / (lag * one) if one > 0 else 0.0
+    return ratio <= WALK, f"over {lag} steps the variance is {ratio:.2g} of that of independent steps"
+
+
+def _uneven(times: np.ndarray, period: float, resolution: float, why: str) -> Judgement:
+    steps = np.diff(times)
+    pause = max(LONG_PAUSE * period, BEYOND_USUAL * float(np.quantile(steps, 0.999)))
+    # A few rows: the longest step itself must not be what is usual.
+    pause = min(pause, max(LONG_PAUSE * period, BEYOND_USUAL * LONG_PAUSE * float(np.median(steps))))
+    usual = steps[steps <= pause]
+    mean = float(usual.mean()) if len(usual) and usual.mean() > 0 else period
+    spread = float(usual.std()) if len(usual) else 0.0
+    why = f"{why}; sampled unevenly, steps {mean:.4g} s ± {spread:.2g} s"
+    return Judgement(mean, False, "stamps", "pauses", spread, resolution, 1, 1, pause, why)
+
+
+def _time_from(
+    meaning: str, coarse: bool, jitter: float, resolution: float
+) -> tuple[Literal["stamps", "line", "envelope"], str]:
+    if meaning == "arrival":
+        return "envelope", "arrival times, as was set"
+    if coarse:
+        return "line", f"rounded to {resolution:.2g} periods"
+    if meaning == "sampled":
+        return "stamps", "sampled, as was set"
+    if jitter < SMALL_JITTER:
+        return "stamps", f"jitter {jitter:.2g} periods r.m.s.: stamps are sampling times"
+    return "envelope", "far off an even grid for a while, but not for good: stamps are arrival times"
+
+
+def _blocks(times: np.ndarray, period: float, width: int) -> np.ndarray:
+    """[n / width, width]: distance from a line of that period, block by block."""
+    rest = times - period * np.arange(len(times))
+    width = max(1, min(width, len(times)))
+    count = len(times) // width
+    return rest[: count * width].reshape(count, width)
+
+
+def _local_range(times: np.ndarray, period: float, resolution: float) -> float:
+    width = max(FEW, min(int(4 * resolution / period), len(times) // 4))
+    return float(np.median(np.ptp(_blocks(times, period, width), axis=1)))
+
+
+def _local_jitter(times: np.ndarray, period: float) -> float:
+    """R.m.s. in periods; the median over blocks, for gaps and stalls."""
+    return float(np.median(_blocks(times, period, FEW).std(axis=1))) / period
+
+
+def _horizon(rows: int, resolution: float) -> int:
+    """Rows of the envelope: long enough for every phase of a rounded stamp, and for stalls; an eighth of the head."""
+    wanted = int(min(max(HORIZON, 4 * resolution), LONGEST_HORIZON))
+    return max(4, min(wanted, rows // 8))
+
+
+def _least_loss(times: np.ndarray, period: float, horizon: int) -> int:
+    """Least run of lost samples that stands out by five sigma of the envelope, at least half a period."""
+    width = max(1, min(256, horizon))
+    envelope = forward_min(times - period * np.arange(len(times)), width)[: len(times) - width + 1 : width]
+    noise = robust_sd(np.diff(envelope)) / period
+    return max(1, math.ceil(min(5 * noise + 0.5, 1e9)))
+
+
+def level_slope(times: np.ndarray, period: float, width: int, lag: int) -> float:
+    """The local period, from minima of blocks of `width` rows, `lag` blocks apart; losses are folded away."""
+    blocks = _blocks(times, period, width).min(axis=1)
+    if len(blocks) < 4 * lag:
+        return period
+    excess = (blocks[lag:] - blocks[:-lag]) / period
+    return period * (1 + midmean(excess - np.rint(excess)) / (lag * width))
