@@ -1,4 +1,4 @@
-"""Validate config.yaml, the boards in use and the data sets, and look whether the files are there.
+"""Validate config.yaml, the boards in use and the data sets, and look whether the data are what they are said to be.
 
 Everything wrong is named at once, one mistake a line: file:line: key: what was expected.
 """
@@ -20,6 +20,7 @@ EPILOG = """\
 examples:
   vgyro check                              config.yaml and the data sets it asks for
   vgyro check raw/bench/dataset.yaml       this data set only (and config.yaml)
+  vgyro check --quick                      the same without reading the data
 
 exit codes:
   0  nothing wrong
@@ -33,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", default="config/config.yaml", help="default: %(default)s")
     parser.add_argument("--raw", default="raw", help="folder of the data sets; default: %(default)s")
     parser.add_argument("--boards", default="config/boards", help="folder of the boards; default: %(default)s")
+    parser.add_argument("--quick", action="store_true", help="read the manifests alone, not the data")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
 
 
@@ -42,12 +44,22 @@ def run(options: argparse.Namespace) -> int:
 
     loaded = _load(options)
     problems = loaded.problems + _unknown_methods(loaded, options.config)
+    warnings: list[Problem] = []
+    if not options.quick:
+        problems, warnings = _with_data(loaded, problems, Path(options.boards))
     if options.json:
-        record = {"ok": not problems, "datasets": sorted(loaded.datasets), "problems": [asdict(p) for p in problems]}
+        record = {
+            "ok": not problems,
+            "datasets": sorted(loaded.datasets),
+            "problems": [asdict(p) for p in problems],
+            "warnings": [asdict(p) for p in warnings],
+        }
         print(json.dumps(record, indent=1, ensure_ascii=False))
     else:
         for problem in problems:
             print(problem, file=sys.stderr)
+        for warning in warnings:
+            print(f"warning: {warning}", file=sys.stderr)
         for name, (manifest, board, _) in loaded.datasets.items():
             count = len(manifest.recordings)
             print(f"{name}: {count} recording{'s' * (count != 1)}, {len(board.gyros)} gyros of board {board.name}")
@@ -61,6 +73,17 @@ def run(options: argparse.Namespace) -> int:
         else:
             print("nothing wrong")
     return ConfigError.exit_code if problems else 0
+
+
+def _with_data(loaded: Loaded, problems: list[Problem], boards: Path) -> tuple[list[Problem], list[Problem]]:
+    """The mistakes with those that the recordings show, and warnings."""
+    from vgyro.cli.check_data import check_data
+
+    warnings: list[Problem] = []
+    for dataset in loaded.datasets.values():
+        found, doubtful = check_data(dataset, boards)
+        problems, warnings = problems + found, warnings + doubtful
+    return problems, warnings
 
 
 def _load(options: argparse.Namespace) -> Loaded:
