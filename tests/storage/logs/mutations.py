@@ -70,8 +70,7 @@ def survive(open_log: Callable, path: Path) -> str:
                 rows.batch.validate(full=True)
                 assert rows.batch.num_rows <= 1 << 18
         outcome = "read"
-    except DataError as error:
-        assert error.what
+    except DataError:
         outcome = "refused"
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)

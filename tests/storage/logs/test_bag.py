@@ -82,7 +82,9 @@ def test_arrays_of_256_values_are_columns_and_longer_ones_are_not(tmp_path):
         path = tmp_path / f"{length}.bag"
         with Writer(path) as writer:
             topic = writer.add_connection("/a", name, typestore=types)
-            writer.write(topic, EPOCH, types.serialize_ros1(types.types[name](layout, np.zeros(length, np.uint8)), name))
+            writer.write(
+                topic, EPOCH, types.serialize_ros1(types.types[name](layout, np.zeros(length, np.uint8)), name)
+            )
         names = [one.name for one in open_log(path).tables[0].columns]
         assert sum(name.startswith("data[") for name in names) == columns
 
@@ -144,10 +146,12 @@ def test_a_ros1_bag_without_index_names_the_cure(bag, tmp_path):
         open_log(tmp_path / "cut.bag")
 
 
-def test_a_damaged_message_is_a_bad_row(bag, table):
+def test_a_damaged_message_is_a_bad_row(bag):
     folder = bag("sqlite")
     with sqlite3.connect(folder / "log.db3") as base:
-        base.execute("UPDATE messages SET data = substr(data, 1, 40) WHERE topic_id = 1 AND timestamp = ?", [EPOCH + 10**7])
+        base.execute(
+            "UPDATE messages SET data = substr(data, 1, 40) WHERE topic_id = 1 AND timestamp = ?", [EPOCH + 10**7]
+        )
     log = open_log(folder)
     (rows,) = log.rows("/imu0", [AXES[0]])
     assert np.array_equal(rows.batch.column(0).to_numpy(), np.delete(RATES[:, 0], 1))
@@ -191,7 +195,7 @@ def test_messages_in_json_are_left_out(tmp_path):
     message = struct.pack("<HIQQ", 1, 0, EPOCH, EPOCH) + b'{"x": 1}'
     path = tmp_path / "log.mcap"
     path.write_bytes(mcap(b"ros2", (3, schema), (4, channel), (5, message)))
-    with pytest.raises(DataError, match="/gyro is in json, not CDR"):
+    with pytest.raises(DataError, match=r"/gyro is in json, not CDR"):
         open_log(path)
 
 
@@ -201,5 +205,5 @@ def test_files_that_are_none(tmp_path):
         path.write_bytes(content)
         with pytest.raises(DataError, match=said):
             open_log(path)
-    with pytest.raises(DataError, match="without metadata.yaml"):
+    with pytest.raises(DataError, match=r"without metadata\.yaml"):
         open_log(tmp_path)

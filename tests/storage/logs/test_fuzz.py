@@ -4,7 +4,6 @@ About 100 examples a family; 10,000 with the long tests. A failure leaves its fi
 """
 
 import gzip
-import shutil
 
 import numpy as np
 import pyarrow as pa
@@ -33,7 +32,12 @@ def write_parquet(path, compression="snappy"):
 
 
 def write_ulog(path):
-    parts = [head(GYRO, FIFO), subscribed(0, "sensor_gyro"), subscribed(1, "sensor_gyro", 1), subscribed(2, "sensor_gyro_fifo")]
+    parts = [
+        head(GYRO, FIFO),
+        subscribed(0, "sensor_gyro"),
+        subscribed(1, "sensor_gyro", 1),
+        subscribed(2, "sensor_gyro_fifo"),
+    ]
     for index in range(20):
         parts += [gyro(index % 2, index * 100, 1, 2, 3), fifo(2, 1000 * index, 250, 0.001, [1, 2, 3])]
         parts += [SYNC, dropout(3)] if index % 7 == 0 else []
@@ -49,7 +53,9 @@ def write_npy(path):
 
 def write_npz(path):
     with open(path, "wb") as file:
-        np.savez_compressed(file, t=np.arange(60), g=GYRO_RATES, d=np.arange(60).astype("M8[ms]"), f=np.asfortranarray(GYRO_RATES))
+        np.savez_compressed(
+            file, t=np.arange(60), g=GYRO_RATES, d=np.arange(60).astype("M8[ms]"), f=np.asfortranarray(GYRO_RATES)
+        )
     return path
 
 
@@ -61,11 +67,17 @@ def write_fields(path):
 
 def write_mat(path, compressed=False):
     cell = np.array([1.0, "x"], dtype=object)
-    arrays = {"t": np.arange(60.0), "g": GYRO_RATES, "imu": {"a": np.arange(60), "deep": {"b": GYRO_RATES[:, :2]}}, "c": cell}
+    arrays = {
+        "t": np.arange(60.0),
+        "g": GYRO_RATES,
+        "imu": {"a": np.arange(60), "deep": {"b": GYRO_RATES[:, :2]}},
+        "c": cell,
+    }
     savemat(path, arrays, do_compression=compressed, appendmat=False)
     return path
 
 
+BAGS = (("ros1", ""), ("ros1", "bz2"), ("ros1", "lz4"), ("sqlite", ""), ("mcap", ""), ("mcap", "storage"))
 SOURCES = {
     "parquet": (parquet.open_log, [write_parquet, lambda path: write_parquet(path, "gzip")]),
     "ulog": (ulog.open_log, [write_ulog]),
@@ -75,7 +87,7 @@ SOURCES = {
         bag.open_log,
         [
             lambda path, kind=kind, compression=compression: write_bag(path, kind, GYRO_RATES[:8], True, compression)
-            for kind, compression in (("ros1", ""), ("ros1", "bz2"), ("ros1", "lz4"), ("sqlite", ""), ("mcap", ""), ("mcap", "storage"))
+            for kind, compression in BAGS
         ],
     ),
 }  # fmt: skip
@@ -87,7 +99,7 @@ def valid(tmp_path, matlab_v73):
 
     def make(family):
         for number, write in enumerate(SOURCES[family][1]):
-            path = tmp_path / f"valid{number}"
+            path = tmp_path / f"{family}{number}"
             if write is None:
                 matlab_v73(path, t=np.arange(60.0), g=GYRO_RATES, imu={"a": np.arange(60.0), "b": np.int16(GYRO_RATES)})
             else:
@@ -152,4 +164,3 @@ def test_the_magic_alone_and_magic_of_others(tmp_path, valid):
             assert outcome == "read" if family == other else outcome in ("read", "refused")
         path.write_bytes(contents[family][:16])
         assert survive(read, path) == "refused"
-    shutil.rmtree(tmp_path)

@@ -1,8 +1,12 @@
-"""MATLAB: 5.0 files by SciPy, v7.3 by h5py; structs by dots; objects, cells and complex numbers with a note."""
+"""MATLAB: 5.0 files (SciPy writes them, and is asked), v7.3 by h5py; structs by dots; objects, cells … with a note."""
+
+import struct
+import tracemalloc
 
 import numpy as np
+import pyarrow as pa
 import pytest
-from scipy.io import savemat
+from scipy.io import loadmat, savemat
 
 from vgyro.errors import DataError
 from vgyro.storage.logs.matlab import open_log
@@ -33,10 +37,8 @@ def test_vectors_and_matrices_of_one_length_are_one_table(written, table):
     assert sorted(one.name for one in log.tables) == ["", "other"]
     found = table(log, "")
     assert log.tables[0].rows == T
-    assert sorted(found.column_names) == sorted(
-        ["t", *(f"gyro[{k}]" for k in range(3)), *(f"acc[{k}]" for k in range(3)), "imu.count"]
-        + ["imu.deep.temp[0]", "imu.deep.temp[1]"]
-    )
+    wide = [f"{name}[{k}]" for name in ("gyro", "acc") for k in range(3)]
+    assert sorted(found.column_names) == sorted([*wide, "t", "imu.count", "imu.deep.temp[0]", "imu.deep.temp[1]"])
     assert np.array_equal(found["t"].to_numpy(), VALUES["t"])
     assert np.array_equal(found["imu.count"].to_numpy(), np.arange(T))
     assert np.array_equal(found["imu.deep.temp[1]"].to_numpy(), GYRO[:, 1])
@@ -75,8 +77,53 @@ def test_what_is_no_number_is_noted(tmp_path, table):
     assert table(log, "").to_pydict() == {"x": [0, 1, 2]}
     assert log.account.notes == [
         "c is a cell array: left out", "s is a char array: left out", "z is complex: left out",
-        "many is an array of structs: left out",
+        "many is a struct array: left out",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_every_type_of_number_is_read_as_scipy_does(tmp_path, table, compressed):
+    path = tmp_path / "log.mat"
+    kinds = ["f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?"]
+    savemat(
+        path,
+        {f"v{kind.strip('?')}": RNG.integers(0, 100, 50).astype(kind) for kind in kinds},
+        do_compression=compressed,
+    )
+    found, expected = table(open_log(path), ""), loadmat(path, mat_dtype=True)
+    for name in found.column_names:
+        assert np.array_equal(found[name].to_numpy(), expected[name][0])
+        assert found[name].to_numpy().dtype == np.uint8 if name == "v" else expected[name].dtype
+    assert len(found.column_names) == len(kinds)
+
+
+def test_doubles_stored_as_whole_numbers_and_big_endian(tmp_path, table):
+    """As MATLAB saves doubles that are whole, and as it did on a SPARC: neither does SciPy write."""
+    for order, mark in (("<", b"IM"), (">", b"MI")):
+
+        def element(kind, content, order=order):
+            return struct.pack(f"{order}II", kind, len(content)) + content + bytes(-len(content) % 8)
+
+        flags, shape = struct.pack(f"{order}II", 6, 0), struct.pack(f"{order}ii", 1, 3)
+        values = struct.pack(f"{order}3h", 1, -2, 300)
+        name = (struct.pack("<HH", 1, 1) if order == "<" else struct.pack(">HH", 1, 1)) + b"x\0\0\0"
+        array = element(14, element(6, flags) + element(5, shape) + name + element(3, values))
+        path = tmp_path / "log.mat"
+        path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + (b"\0\1" if order == "<" else b"\1\0") + mark + array)
+        assert loadmat(path)["x"].tolist() == [[1, -2, 300]]
+        found = table(open_log(path), "")["x"]
+        assert (found.to_pylist(), found.type) == ([1.0, -2.0, 300.0], pa.float64())
+
+
+def test_what_is_not_compressed_is_not_loaded(tmp_path):
+    path = tmp_path / "log.mat"
+    savemat(path, {"g": np.zeros((2_000_000, 3))})
+    tracemalloc.start()
+    rows = sum(one.batch.num_rows for one in open_log(path).rows("g", ["g[1]"]))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert rows == 2_000_000
+    assert peak < 10e6
 
 
 def test_a_timetable_is_told_how_to_be_saved(tmp_path, matlab_v73, table):

@@ -30,7 +30,10 @@ def test_a_vector_is_c1(tmp_path, table):
 
 def test_fields_dates_and_truth(tmp_path, table):
     kind = [("t", "M8[ms]"), ("gyro", "<i2", 2), ("at", [("x", "f2")]), ("on", "?"), ("who", "S3"), ("d", "m8[us]")]
-    np.save(tmp_path / "s.npy", np.array([(1, (2, 3), (0.5,), True, b"ab", 7), ("NaT", (4, 5), (1.5,), False, b"c", 8)], kind))
+    np.save(
+        tmp_path / "s.npy",
+        np.array([(1, (2, 3), (0.5,), True, b"ab", 7), ("NaT", (4, 5), (1.5,), False, b"c", 8)], kind),
+    )
     log = open_log(tmp_path / "s.npy")
     assert table(log, "").to_pydict() == {
         "t": [1_000_000, None], "gyro[0]": [2, 4], "gyro[1]": [3, 5], "at.x": [0.5, 1.5], "on": [1, 0],
@@ -94,7 +97,12 @@ def test_pickles_are_refused(tmp_path):
 
 
 def test_shapes_that_are_no_table(tmp_path):
-    for shape, said in (((2, 2, 2), "3 dimensions"), ((), "0 dimensions"), ((3, 4097), "3 rows of 4097 columns"), ((0, 3), "0 rows")):
+    for shape, said in (
+        ((2, 2, 2), "3 dimensions"),
+        ((), "0 dimensions"),
+        ((3, 4097), "3 rows of 4097 columns"),
+        ((0, 3), "0 rows"),
+    ):
         np.save(tmp_path / "a.npy", np.zeros(shape))
         with pytest.raises(DataError, match=said):
             open_log(tmp_path / "a.npy")

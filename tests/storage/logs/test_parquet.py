@@ -23,7 +23,11 @@ def written(tmp_path):
 
 def test_numbers_come_back_bit_for_bit(written, table):
     rng = np.random.default_rng(1)
-    columns = {"x": rng.normal(size=999), "y": np.float32(rng.normal(size=999)), "n": rng.integers(-(2**62), 2**62, 999)}
+    columns = {
+        "x": rng.normal(size=999),
+        "y": np.float32(rng.normal(size=999)),
+        "n": rng.integers(-(2**62), 2**62, 999),
+    }
     log = open_log(written(columns, row_group_size=100))
     found = table(log, "")
     assert log.tables[0].rows == 999
@@ -113,4 +117,6 @@ def test_files_that_are_none(tmp_path, written):
         open_log(written({"x": ["a"]}))
     with pytest.raises(DataError, match="more than 4096 columns"):
         open_log(written({"x": pa.array([[0.0] * 4097], pa.list_(pa.float64(), 4097))}))
-    assert len(open_log(written({"x": pa.array([[0.0] * 4096], pa.list_(pa.float64(), 4096))})).tables[0].columns) == 4096
+    assert (
+        len(open_log(written({"x": pa.array([[0.0] * 4096], pa.list_(pa.float64(), 4096))})).tables[0].columns) == 4096
+    )

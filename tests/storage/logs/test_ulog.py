@@ -1,4 +1,4 @@
-"""ULog: topics, instances, units, FIFO samples, dropouts, damage; the bytes are written by hand and checked by pyulog."""
+"""ULog: topics, instances, units, FIFO samples, dropouts, damage; bytes written by hand and checked by pyulog."""
 
 import struct
 
@@ -133,4 +133,6 @@ def test_files_that_are_none(written):
     ):  # fmt: skip
         with pytest.raises(DataError, match=said):
             open_log(written(content))
-    assert open_log(written(head(GYRO, flags=bytes(8) + b"\1" + bytes(31)) + START[len(head(GYRO, COMBINED, FIFO)) :] + body()[0]))
+    assert open_log(
+        written(head(GYRO, flags=bytes(8) + b"\1" + bytes(31)) + START[len(head(GYRO, COMBINED, FIFO)) :] + body()[0])
+    )

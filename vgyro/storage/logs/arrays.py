@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -99,10 +100,8 @@ def _spread(name: str, dtype: np.dtype, inner: tuple[int, ...]) -> Iterator[tupl
         for part in dtype.names if not inner else ():
             kind, *_ = dtype.fields[part]  # type: ignore[index]
             shape = kind.shape
-            yield from (
-                (found, value, unit, lambda block, at=part, then=take: then(block[at]))
-                for found, value, unit, take in _spread(f"{name}.{part}" if name else part, kind.base, shape)
-            )
+            for found, value, unit, take in _spread(f"{name}.{part}" if name else part, kind.base, shape):
+                yield found, value, unit, partial(_within, part, take)
         return
     if dtype.kind not in "biufMmSU":
         return
@@ -111,7 +110,15 @@ def _spread(name: str, dtype: np.dtype, inner: tuple[int, ...]) -> Iterator[tupl
     if not inner:
         yield name or "c1", kind_of, unit, lambda block: block
     for index in range(inner[0] if inner else 0):
-        yield f"{name}[{index}]" if name else f"c{index + 1}", kind_of, unit, lambda block, at=index: block[:, at]
+        yield f"{name}[{index}]" if name else f"c{index + 1}", kind_of, unit, partial(_column, index)
+
+
+def _within(part: str, take: Take, block: np.ndarray) -> np.ndarray:
+    return take(block[part])
+
+
+def _column(index: int, block: np.ndarray) -> np.ndarray:
+    return block[:, index]
 
 
 def stream(leaves: Sequence[Leaf]) -> Iterator[Rows]:

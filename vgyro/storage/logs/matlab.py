@@ -1,22 +1,23 @@
-"""MATLAB files: -v7 and older 5.0 files through SciPy, -v7.3 (which are HDF5) through h5py."""
+"""MATLAB files: 5.0 files (save -v6, -v7), and -v7.3, which are HDF5, through h5py."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vgyro.errors import DataError
 from vgyro.storage.logs.arrays import Variable, blocks_of, stream, tables_of
-from vgyro.storage.logs.opened import OpenedLog, check_not_empty, needed, reading, too_many
+from vgyro.storage.logs.opened import OpenedLog, check_not_empty, reading
 from vgyro.storage.logs.table import Account, LogTable, Rows
+
+if TYPE_CHECKING:
+    from vgyro.storage.logs.mat5 import Array
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 USER_BLOCKS = (0, 512, 1024, 2048, 4096)
-NUMBERS = ("double", "single", "logical", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
-DEPTH = 16
 AS_STRUCT = "save it as a struct (table2struct, or timetable2table first) or as CSV (writetimetable)"
 
 
@@ -35,8 +36,8 @@ def open_log(path: Path) -> OpenedLog:
 
     Vectors of one length, and matrices with as many rows or columns, are the table "", with columns name, or name[0],
     name[1], … Matrices of other lengths are a table each. The fields of structs are name.field. Cells, texts, objects
-    and complex numbers are left out, with a note. A 5.0 file's variables are loaded whole when they are read, its
-    structs when it is opened; a -v7.3 file is streamed.
+    and complex numbers are left out, with a note. Compressed variables of a 5.0 file are unpacked whole when they are
+    read, structs when it is opened; other ones, and those of a -v7.3 file, are streamed.
     raises : DataError for a file that is not MATLAB's, or whose tables MATLAB alone can read (timetable)
     """
     check_not_empty(path)
@@ -61,68 +62,43 @@ def open_log(path: Path) -> OpenedLog:
 
 
 def _variables_v5(path: Path, notes: list[str]) -> list[Variable]:
-    with needed("scipy", "a MATLAB file", path):
-        from scipy.io import whosmat
-    from vgyro.storage.logs.mat5 import check_structure
+    from vgyro.storage.logs.mat5 import arrays_of
 
     variables: list[Variable] = []
     with reading("MATLAB file", path):
-        flags = check_structure(path)
-        for (name, shape, kind), is_complex in zip(whosmat(str(path)), flags, strict=True):
-            if is_complex:
-                notes.append(f"{name} is complex: left out")
-            elif kind in NUMBERS:
-                variables += _numeric(path, name, shape, kind)
-            elif kind == "struct":
-                _fields(name, _load(path, name), variables, notes, 0)
-            elif kind in ("object", "opaque", "function", "unknown"):
-                notes.append(f"{name} is an object of MATLAB (a table, timetable, datetime …): left out")
-            else:
-                notes.append(f"{name} is a {kind} array: left out")
+        for array in arrays_of(path):
+            _flatten(array, array.name, variables, notes)
     return variables
 
 
-def _numeric(path: Path, name: str, shape: tuple[int, ...], kind: str) -> list[Variable]:
-    """A vector or matrix that is loaded when it is read."""
-    if len(shape) > 2 or 0 in shape or too_many(shape, 1, path.stat().st_size):
-        return []
-    dtype = np.dtype({"double": "f8", "single": "f4", "logical": "u1"}.get(kind, kind))
+def _flatten(array: Array, name: str, variables: list[Variable], notes: list[str]) -> None:
+    """The numbers in a variable, those in a struct by dots; a note on anything else."""
+    for part in array.fields:
+        _flatten(part, f"{name}.{part.name}", variables, notes)
+    if array.fields or 0 in array.shape:
+        return
+    if array.is_complex:
+        notes.append(f"{name} is complex: left out")
+    elif array.kind in ("object", "opaque", "function", "unknown"):
+        notes.append(f"{name} is an object of MATLAB (a table, timetable, datetime …): left out")
+    elif array.load is None:
+        notes.append(f"{name} is a {array.kind} array: left out")
+    elif len(array.shape) == 2:
+        variables.append(_matrix(name, array.shape, np.dtype(array.kind), array.load))
 
-    def whole() -> np.ndarray:
-        found = _load(path, name)
-        if found.shape != shape:
-            raise ValueError(f"{name} is {found.shape}, not {shape}")
-        return found
 
-    return [_matrix(name, shape, dtype, whole)]
+def _matrix(name: str, shape: tuple[int, ...], dtype: np.dtype, load: Callable[[], np.ndarray]) -> Variable:
+    """A MATLAB array [rows, columns]. One row, or one column, is a vector."""
 
+    def straight(size: int) -> Iterator[np.ndarray]:
+        yield from blocks_of(load())(size)
 
-def _matrix(name: str, shape: tuple[int, ...], dtype: np.dtype, whole: Any) -> Variable:
-    """A MATLAB array [rows, columns]; whole() gives it. One row, or one column, is a vector."""
+    def turned(size: int) -> Iterator[np.ndarray]:
+        yield from blocks_of(load().T)(size)
+
+    def flat(size: int) -> Iterator[np.ndarray]:
+        yield from blocks_of(load().reshape(-1))(size)
+
     if 1 in shape:
-        return Variable(name, (max(shape),), dtype, lambda size: blocks_of(whole().reshape(-1))(size))
-    return Variable(
-        name, shape, dtype, lambda size: blocks_of(whole())(size), lambda size: blocks_of(whole().T)(size)
-    )  # fmt: skip
-
-
-def _load(path: Path, name: str) -> np.ndarray:
-    from scipy.io import loadmat
-
-    return np.asarray(loadmat(str(path), variable_names=[name], mat_dtype=True)[name])
-
-
-def _fields(name: str, found: np.ndarray, variables: list[Variable], notes: list[str], depth: int) -> None:
-    """The numbers in a struct, by dots."""
-    if found.dtype.names is not None:
-        if found.size != 1 or depth > DEPTH:
-            notes.append(f"{name} is an array of structs: left out")
-            return
-        for part in found.dtype.names:
-            _fields(f"{name}.{part}", np.asarray(found.reshape(-1)[0][part]), variables, notes, depth + 1)
-    elif found.dtype.kind in "biuf" and found.ndim <= 2 and found.size:
-        values = np.atleast_2d(found)
-        variables.append(_matrix(name, values.shape, values.dtype, lambda: values))
-    elif found.size:
-        kind = "text" if found.dtype.kind in "US" else "a cell or an object"
-        notes.append(f"{name} is {kind}: left out")
+        return Variable(name, (max(shape),), dtype, flat)
+    return Variable(name, shape, dtype, straight, turned)

@@ -6,6 +6,7 @@ A .npy is mapped, not loaded. Arrays in a .npz are unpacked as they are read. No
 from __future__ import annotations
 
 import math
+import tokenize
 import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -19,7 +20,7 @@ from vgyro.storage.logs.opened import WIDEST, OpenedLog, check_not_empty, readin
 from vgyro.storage.logs.table import Account, LogTable, Rows
 
 ZIP = b"PK\x03\x04"
-ERRORS = (zipfile.BadZipFile, zipfile.LargeZipFile)
+ERRORS = (zipfile.BadZipFile, zipfile.LargeZipFile, tokenize.TokenError)
 MEMORY = 1 << 31
 """Most bytes of an array that must be unpacked whole, because it is stored column by column."""
 

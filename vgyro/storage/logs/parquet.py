@@ -6,6 +6,7 @@ Times keep their ns; lists of numbers are spread over columns name[0], name[1], 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -87,8 +88,6 @@ def _leaves(schema: pa.Schema, first: pa.RecordBatch | None, path: Path) -> list
 
 def _spread(name: str, kind: pa.DataType, width: int) -> Iterator[tuple[str, Kind, str, Take]]:
     """The columns that one of the file makes."""
-    import pyarrow.compute as pc
-
     if (found := _plain(kind)) is not None:
         yield name, *found
     elif pa.types.is_fixed_size_list(kind) or _is_list(kind):
@@ -96,14 +95,20 @@ def _spread(name: str, kind: pa.DataType, width: int) -> Iterator[tuple[str, Kin
         if (found := _plain(kind.value_type)) is not None:
             value, unit, inner = found
             for index in range(fixed):
-                yield f"{name}[{index}]", value, unit, _then(lambda array, at=index: _element(array, at), inner)
+                yield f"{name}[{index}]", value, unit, _then(partial(_element, index), inner)
     elif pa.types.is_struct(kind):
         for index, field in enumerate(kind):
             for inner_name, value, unit, inner in _spread(f"{name}.{field.name}", field.type, 0):
-                yield inner_name, value, unit, _then(lambda array, at=index: pc.struct_field(array, [at]), inner)
+                yield inner_name, value, unit, _then(partial(_field, index), inner)
 
 
-def _element(array: pa.Array, index: int) -> pa.Array:
+def _field(index: int, array: pa.Array) -> pa.Array:
+    import pyarrow.compute as pc
+
+    return pc.struct_field(array, [index])
+
+
+def _element(index: int, array: pa.Array) -> pa.Array:
     """The values at one place of lists of any length; null where a list is too short.
 
     Unlike list_element, which raises there.
@@ -139,7 +144,8 @@ def _plain(kind: pa.DataType) -> tuple[Kind, str, Take] | None:
     if types.is_integer(kind) or types.is_floating(kind):
         return "number", "", lambda array: array
     if types.is_string(kind) or types.is_large_string(kind) or types.is_string_view(kind):
-        return "text", "", lambda array: array.cast(pa.string())
+        # By way of bytes, so that damaged text is found.
+        return "text", "", lambda array: array.cast(pa.large_binary()).cast(pa.string())
     return None
 
 
