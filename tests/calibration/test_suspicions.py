@@ -11,6 +11,7 @@ from vgyro.calibration.suspicions import (
     relative_scales,
     same_columns,
     scale_suspicions,
+    shared_channels,
     unsteady_plateaus,
 )
 
@@ -162,3 +163,9 @@ def test_equal_columns_are_named_and_constant_ones_are_not():
 def test_a_rate_that_the_stamps_contradict(measured, sure):
     found = rate_suspicion(100.0, measured)
     assert (None if found is None else found.sure) == sure
+
+
+def test_one_channel_of_two_gyros():
+    assert shared_channels(NAMES, ["a", "b", "c"]) == []
+    (found,) = shared_channels(NAMES, ["a", "b", "a"])
+    assert found.message == "gyros g1 and g3 read one channel, a: mend `field` in the board file"

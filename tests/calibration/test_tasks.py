@@ -251,3 +251,24 @@ def test_empty_frames(tmp_path: Path, board: Board):
     rates = run_convert(tmp_path, board, record, "static", frames)
     assert len(rates["time"]) == 0
     assert {gyro.name for gyro in board.gyros} <= set(rates)
+
+
+def table_run(tmp_path, board, change) -> list[str]:
+    """Suspicions of a calibration whose plateaus are changed by `change(plateau)`."""
+    run = calibration_run()
+    run["reference"]["plateaus"] = [change(dict(plateau)) for plateau in run["reference"]["plateaus"]]
+    record = manifest(run)
+    return run_calibrate(tmp_path, board, record, [write_frames(tmp_path, counts_of(board, staircase()))])["suspicions"]
+
+
+def test_a_good_table_raises_no_suspicion(tmp_path, board):
+    assert table_run(tmp_path, board, lambda plateau: plateau) == []
+
+
+def test_rates_in_radians_and_shifted_plateaus_are_suspicions(tmp_path, board):
+    (said,) = table_run(tmp_path, board, lambda plateau: {**plateau, "rate": plateau["rate"] / 57.29578})
+    assert said.startswith("calibration: the plateaus' rates look like rad/s: multiply them by 57.29578")
+    later = table_run(
+        tmp_path, board, lambda plateau: {**plateau, "start": plateau["start"] + 3, "stop": plateau["stop"] + 3}
+    )
+    assert "moving all plateaus by -3." in later[0]

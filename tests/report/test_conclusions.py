@@ -247,3 +247,10 @@ def test_order_that_depends_on_the_averaging_time(dataset, second, said):
     assert len(found) == said
     if said:
         assert "0.80 of the former's" in found[0]
+
+
+def test_what_the_calibration_suspects_is_said_first_and_in_red(dataset):
+    calibration = {**dataset.calibration, "suspicions": ["table: the plateaus' rates look like rad/s"]}
+    first = conclude(replace(dataset, calibration=calibration))[0]
+    assert (first.text, first.tone) == ("Table: the plateaus' rates look like rad/s.", "bad")
+    assert not any("rad/s" in one.text for one in conclude(dataset))

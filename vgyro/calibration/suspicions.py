@@ -206,6 +206,16 @@ def same_columns(values: np.ndarray, names: Sequence[str]) -> list[Suspicion]:
     return found
 
 
+def shared_channels(names: Sequence[str], fields: Sequence[str]) -> list[Suspicion]:
+    """Gyros of a board that read the same channel. fields : the channel of each"""
+    return [
+        Suspicion(f"gyros {names[other]} and {name} read one channel, {field}: mend `field` in the board file", True)
+        for place, (name, field) in enumerate(zip(names, fields, strict=True))
+        for other in range(place)
+        if fields[other] == field
+    ]
+
+
 def rate_suspicion(declared_hz: float, measured_hz: float) -> Suspicion | None:
     """A declared sample rate that the time stamps contradict: a warning from 2 % on, a mistake from 10 % on."""
     error = measured_hz / declared_hz - 1

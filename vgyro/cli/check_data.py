@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vgyro.board import BinaryFrame, Board, Gyro
+from vgyro.board import BinaryFrame, Board
 from vgyro.calibration import average_plateaus, find_moves, gyro_windows, window_length
 from vgyro.calibration.suspicions import (
     Suspicion,
@@ -18,6 +18,7 @@ from vgyro.calibration.suspicions import (
     relative_scales,
     same_columns,
     scale_suspicions,
+    shared_channels,
     unsteady_plateaus,
 )
 from vgyro.config import CalibrationOptions, IntegrityOptions, RestOptions
@@ -100,7 +101,10 @@ def _of_recording(
         return
     names = [gyro.name for gyro in board.gyros]
     # Identical numbers of one channel are named by the board alone.
-    yield from (Finding(key, one) for one in [*shared_channels(board.gyros), *_same(head, board, names)])
+    yield from (
+        Finding(key, one)
+        for one in [*shared_channels(names, [gyro.field for gyro in board.gyros]), *_same(head, board, names)]
+    )
     yield from (Finding(_rate_key(key, recording), one) for one in _rate(head, recording, board))
     yield from _times(key, head, recording)
     yield from (Finding(key, one) for one in _moves(head, recording, board))
@@ -124,19 +128,6 @@ def read_head(paths: list[Path], recording: Recording, board: Board, boards: Pat
     if not columns:
         return Head(np.empty((0, len(fields))), np.empty(0), reader.integrity is not None, reader.integrity)
     return Head(np.concatenate(columns), np.concatenate(times), reader.integrity is not None, reader.integrity)
-
-
-def shared_channels(gyros: tuple[Gyro, ...]) -> list[Suspicion]:
-    """Gyros of a board that read the same channel."""
-    found = []
-    for place, gyro in enumerate(gyros):
-        for other in gyros[:place]:
-            if other.field == gyro.field:
-                text = (
-                    f"gyros {other.name} and {gyro.name} read one channel, {gyro.field}: mend `field` in the board file"
-                )
-                found.append(Suspicion(text, True))
-    return found
 
 
 def _same(head: Head, board: Board, names: list[str]) -> list[Suspicion]:

@@ -17,6 +17,7 @@ from vgyro.report.noise import OVERLAPPING
 from vgyro.report.numbers import percent, significant
 from vgyro.report.scale import nominal
 from vgyro.report.sentences import Conclusion, moved_words, named
+from vgyro.report.suspicions import suspicion_sentences
 
 BAD_FACTOR = 2.0
 BAD_ARW_FACTOR = 1.5
@@ -47,7 +48,8 @@ class BadGyro:
 
 def conclude(dataset: DatasetPart) -> list[Conclusion]:
     """All sentences, the most important first."""
-    found = moved_sentences(dataset) + _gyro_sentences(dataset) + fault_sentences(dataset)
+    found = suspicion_sentences(dataset) + moved_sentences(dataset)
+    found += _gyro_sentences(dataset) + fault_sentences(dataset)
     for array in main_arrays(dataset):
         found += rest_sentences(dataset, array)
     found += motion_sentences(dataset)

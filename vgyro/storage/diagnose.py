@@ -181,7 +181,7 @@ def _other_sync(buffer: np.ndarray, frame: BinaryFrame, length: int, board: Boar
         values, counts = np.unique(rows, axis=0, return_counts=True)
         if counts.max() >= SURE * len(rows):
             usual = values[np.argmax(counts)].tobytes()
-            changes = (("frame.sync", usual.hex(" ").upper()),)
+            changes: tuple[tuple[str, str], ...] = (("frame.sync", usual.hex(" ").upper()),)
             if length != frame.length:
                 changes += _with_length(frame, length, start).changes
             yield Layout(base.model_copy(update={"sync": usual.hex(" ").upper()}), places, changes)
@@ -283,7 +283,8 @@ def _steps(buffer: np.ndarray, places: np.ndarray, board: Board, frame: BinaryFr
     if board.counter is None:
         return np.empty(0, dtype=np.int64)
     (values,) = _read(buffer, places, frame, columns_of(frame, [board.counter.field]))
-    return (np.diff(values.astype(np.int64)) % board.counter.modulus)[np.diff(places) == frame.length]
+    steps = np.mod(np.diff(values.astype(np.int64)), board.counter.modulus)
+    return steps[np.diff(places) == frame.length]
 
 
 def _in_step(buffer: np.ndarray, places: np.ndarray, board: Board, frame: BinaryFrame) -> float:

@@ -24,6 +24,7 @@ from vgyro.config import CalibrationOptions, RestOptions
 from vgyro.dataset import FileReference, Manifest, values_of
 from vgyro.storage.tables import read_json, write_json
 from vgyro.tasks.block_means import thermometer_of
+from vgyro.tasks.calibrate_suspicions import suspicions_of
 from vgyro.tasks.calibrate_tables import Source, Test, cross_axes, fit_tests, nominal_of
 from vgyro.tasks.calibrate_thermal import Thermal, read_rests, temperature_record, thermal_of, worth_it
 from vgyro.tasks.common import Task, run_task
@@ -70,6 +71,7 @@ def main(task: Task) -> None:
         "rule": RULE,
         "recordings": {axis: test.name if test else None for axis, test in used.items()},
         "skipped": {**skipped, **problems},
+        "suspicions": suspicions_of(tables, tests, board, options),
         "earth_rate_removed": manifest.latitude_deg is not None and any(used.values()),
         "test": {axis: test_record(axis, tests, manifest.latitude_deg) for axis, test in used.items() if test},
         "gyros": gyros,
