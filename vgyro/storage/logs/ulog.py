@@ -44,7 +44,7 @@ UNITS = {
 
 
 def open_log(path: Path) -> OpenedLog:
-    """Open a ULog; the headers of its messages are walked through, which takes about a second a 100 MB.
+    """Open a ULog; the headers of its messages are walked through: two seconds a million.
 
     pyulog loads whole files: reading takes as much memory as the wanted topic's messages, and walks the file once more.
     columns : the message's fields, arrays as name[0] …, those within by dots; "timestamp" is µs since start.
