@@ -87,14 +87,17 @@ class Clock:
             return Placed(keep, rows / self._record.rate_hz, np.zeros(len(rows), dtype=np.int32), rows)
         counter, segment = self._track.counter(rows)
         if self._track.lines:
-            return Placed(keep, self._track.on_line(rows, counter), segment, counter)
+            return Placed(keep, self._onward(self._track.on_line(rows, counter)), segment, counter)
         bad = ~usable(stamps, self._rules.scale)
         low, high = np.searchsorted(self._track.spikes, [self._rows, self._rows + len(stamps)])
         bad[self._track.spikes[low:high] - self._rows] = True
         self._rows += len(stamps)
         seconds = self._unfolder.feed(stamps, bad).seconds[keep]
         time = self._track.bad.fill(seconds, first) - self._track.times[0]
-        # Jitter, or a damaged stamp, must not turn time back.
+        return Placed(keep, self._onward(time), segment, counter)
+
+    def _onward(self, time: np.ndarray) -> np.ndarray:
+        """Jitter, a damaged stamp or rounding must not turn time back."""
         time = np.maximum.accumulate(np.concatenate([[self._latest], time]))[1:]
         self._latest = float(time[-1]) if len(time) else self._latest
-        return Placed(keep, time, segment, counter)
+        return time

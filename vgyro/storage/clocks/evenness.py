@@ -23,9 +23,13 @@ COHERENT = 0.25  # s.d. of the steps up to which their phase is told apart
 SMALL_JITTER = 0.2  # r.m.s., periods: stamps are sampling times
 STEADY_JITTER = 0.1  # … up to here single steps tell a lost sample
 WALK = 0.35  # of the variance of independent steps
+QUARTILES = 1.349  # distance of those of a normal distribution, sigma
 COARSE = 0.02  # resolution, periods
 LONG_PAUSE = 5.0  # mean steps, and …
-BEYOND_USUAL = 2.0  # … times the 99.9th percentile of the steps
+BEYOND_USUAL = 2.0  # … times the 99.9th percentile of the steps …
+FEW_STEPS = 1000  # … or, of fewer steps, times the former bound
+ROUNDED_STEPS = 0.3  # resolution, periods
+MIN_BEATS, BEAT_SPREAD = 8, 0.3  # regular odd steps: distances between them, and their s.d. over their mean
 HORIZON, LONGEST_HORIZON = 2048, 65_536  # rows over which an envelope is taken
 
 
@@ -38,7 +42,7 @@ class Judgement(NamedTuple):
     losses     : how they are found: by "steps" of the stamps, by the "level" of their envelope, by "pauses"
     jitter     : s, r.m.s. about the grid; of the steps if uneven
     resolution : s
-    horizon    : rows of the envelope
+    horizon    : rows of the envelope; noise: of the envelope, one sigma, s
     least_loss : samples that must be missing in a row to be seen
     pause      : s, a longer step is an interruption, of uneven stamps
     why        : a sentence
@@ -51,6 +55,7 @@ class Judgement(NamedTuple):
     jitter: float
     resolution: float
     horizon: int
+    noise: float
     least_loss: int
     pause: float
     why: str
@@ -64,13 +69,16 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
        periods P, so that where steps spread by less than 0.25 P and bursts are absent, phases are compared: with
        R(m) = |mean exp(2πi (s[k+m]-s[k])/P)|, a grid has R(m) = R(1), a walk R(1)^m. The smallest m (a power of two up
        to 1024) with R(1)^m < 0.3 decides, at the geometric mean of both. Steps that spread by less than 0.005 P are
-       even. Else, the variances, the outer 0.5 % cut off: a walk if D(m) > 0.35 m D(1) at m = n/64, at least 8 and
-       at most 1024. With fewer than 64 rows only the spread counts: even below 0.28 P.
+       even. Else, the variances: a walk if D(m) > 0.35 m D(1) at m = n/64, at least 8 and at most 1024; the outer
+       0.5 % of steps are cut off, and D(m) is taken from the quartiles. With fewer than 64 rows only the spread counts:
+       even below 0.28 P.
     2. On a grid: stamps that are off by up to 0.25 to 1.2 steps of their resolution, and that above 0.02 P, are
        rounded: sampled, time from the line through them. With less than 0.2 P r.m.s. of jitter, and less than 5 % of
        steps below half a period, they are sampled: time is the stamp. Else they are arrival times, never earlier than
        the sample: time is the lower envelope.
     3. Off the grid: sampled unevenly, time is the stamp.
+    Steps that are all the resolution or a multiple: samples are missing, unless the odd ones come regularly (nine or
+    more, distances with a s.d. below 0.3 of their mean, chance gives 1): then the period is no whole number of ticks.
 
     times      : float64 [n], s, wraps undone, repeats dropped
     resolution : s, as the steps show it; finest: s, taken instead if that is but the period
@@ -82,30 +90,34 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     period, lag = rough_period(times)
     if not (period > 0 and math.isfinite(1 / period)):
         return None
+    steps, beat = np.diff(times), None
     if 0.95 < period / resolution < 1.05:
-        resolution = finest
-    steps = np.diff(times)
+        beat = _beat_period(steps, resolution)
+        period, resolution = (period, finest) if beat is None else (beat[0], resolution)
     phase_sd, short = _step_phase(steps, period)
     even, why = _on_grid(times, period, phase_sd, short)
     if meaning == "arrival":
         even = True
     if not even:
         return _uneven(times, period, resolution, why)
-    if len(times) >= FEW:
+    if len(times) >= FEW and beat is None:
         period = refined_period(times, period, lag)
         phase_sd, short = _step_phase(steps, period)
     jitter = phase_sd / math.sqrt(2) if short < SHORT_STEPS and phase_sd < math.inf else math.inf
-    spread = _local_range(times, period, resolution) / resolution
-    coarse = resolution > COARSE * period and 0.25 <= spread <= 1.2
+    coarse = resolution > COARSE * period and _is_rounded(times, period, resolution)
     time_from, why_time = _time_from(meaning, coarse, jitter, resolution / period)
-    steady = jitter < STEADY_JITTER and time_from != "envelope"
+    # Rounding by more than this moves single steps by as much as a lost sample does.
+    fine = not coarse or resolution < ROUNDED_STEPS * period
+    steady = jitter < STEADY_JITTER and time_from != "envelope" and fine
     if not math.isfinite(jitter) or jitter > SMALL_JITTER:
         jitter = _local_jitter(times, period)
-    horizon = _horizon(len(times), resolution / period)
-    least = 1 if steady else _least_loss(times, period, horizon)
+    horizon = _horizon(len(times), resolution / period) if beat is None else _beat_horizon(beat[1])
+    noise = _envelope_noise(times, period, horizon if coarse else min(256, horizon))
+    # Five sigma of the envelope, and at least half a period.
+    least = 1 if steady else max(1, math.ceil(min(5 * noise / period + 0.5, 1e9)))
     why = f"{why}; {why_time}"
     losses: Literal["steps", "level"] = "steps" if steady else "level"
-    return Judgement(period, True, time_from, losses, jitter * period, resolution, horizon, least, math.inf, why)
+    return Judgement(period, True, time_from, losses, jitter * period, resolution, horizon, noise, least, math.inf, why)
 
 
 def _step_phase(steps: np.ndarray, period: float) -> tuple[float, float]:
@@ -145,25 +157,25 @@ def _by_phase(times: np.ndarray, period: float) -> tuple[bool, str]:
 def _by_variance(times: np.ndarray) -> tuple[bool, str]:
     lag = max(min(1024, len(times) // 64), min(8, len(times) // 8))
 
-    def variance(advance: np.ndarray) -> float:
-        low, high = np.quantile(advance, [0.005, 0.995])
-        return float(np.clip(advance, low, high).var())
-
-    one, many = variance(np.diff(times)), variance(times[lag:] - times[:-lag])
-    ratio = many / (lag * one) if one > 0 else 0.0
+    steps = np.diff(times)
+    one = float(np.clip(steps, *np.quantile(steps, [0.005, 0.995])).var())
+    # Stalls spoil many long lags, though few steps: quartiles, scaled as those of a normal distribution.
+    low, high = np.quantile(times[lag:] - times[:-lag], [0.25, 0.75])
+    ratio = float((high - low) / QUARTILES) ** 2 / (lag * one) if one > 0 else 0.0
     return ratio <= WALK, f"over {lag} steps the variance is {ratio:.2g} of that of independent steps"
 
 
 def _uneven(times: np.ndarray, period: float, resolution: float, why: str) -> Judgement:
     steps = np.diff(times)
     pause = max(LONG_PAUSE * period, BEYOND_USUAL * float(np.quantile(steps, 0.999)))
-    # A few rows: the longest step itself must not be what is usual.
-    pause = min(pause, max(LONG_PAUSE * period, BEYOND_USUAL * LONG_PAUSE * float(np.median(steps))))
+    if len(steps) < FEW_STEPS:
+        # The longest step itself must not be what is usual.
+        pause = min(pause, BEYOND_USUAL * LONG_PAUSE * period)
     usual = steps[steps <= pause]
     mean = float(usual.mean()) if len(usual) and usual.mean() > 0 else period
     spread = float(usual.std()) if len(usual) else 0.0
     why = f"{why}; sampled unevenly, steps {mean:.4g} s ± {spread:.2g} s"
-    return Judgement(mean, False, "stamps", "pauses", spread, resolution, 1, 1, pause, why)
+    return Judgement(mean, False, "stamps", "pauses", spread, resolution, 1, 0.0, 1, pause, why)
 
 
 def _time_from(
@@ -188,9 +200,33 @@ def _blocks(times: np.ndarray, period: float, width: int) -> np.ndarray:
     return rest[: count * width].reshape(count, width)
 
 
-def _local_range(times: np.ndarray, period: float, resolution: float) -> float:
-    width = max(FEW, min(int(4 * resolution / period), len(times) // 4))
-    return float(np.median(np.ptp(_blocks(times, period, width), axis=1)))
+def _is_rounded(times: np.ndarray, period: float, resolution: float) -> bool:
+    """Distances from the line fill a good part of one step of the resolution, and no more, in short or long blocks."""
+    for width in (FEW, 16 * FEW, int(min(4 * resolution / period, LONGEST_HORIZON))):
+        blocks = _blocks(times, period, min(max(FEW, width), max(FEW, len(times) // 4)))
+        if 0.25 <= float(np.median(np.ptp(blocks, axis=1))) / resolution <= 1.2:
+            return True
+    return False
+
+
+def _beat_period(steps: np.ndarray, tick: float) -> tuple[float, float] | None:
+    """The period behind steps of one tick with regular odd ones, and rows between these; None if they are not regular.
+
+    See `judge`.
+    """
+    ticks = np.rint(steps / tick)
+    odd = np.flatnonzero(ticks != 1)
+    apart = np.diff(odd)
+    if len(apart) < MIN_BEATS or np.mean(np.abs(ticks[odd] - 1) == 1) < 0.95:
+        return None
+    if float(apart.std()) >= BEAT_SPREAD * float(apart.mean()):
+        return None
+    return float(steps[np.abs(ticks - 1) <= 1].mean()), float(apart.mean())
+
+
+def _beat_horizon(rows: float) -> int:
+    """A rounded stamp moves against the grid for as many rows before it jumps back."""
+    return int(min(max(HORIZON, 1.5 * rows), LONGEST_HORIZON))
 
 
 def _local_jitter(times: np.ndarray, period: float) -> float:
@@ -204,16 +240,16 @@ def _horizon(rows: int, resolution: float) -> int:
     return max(4, min(wanted, rows // 8))
 
 
-def _least_loss(times: np.ndarray, period: float, horizon: int) -> int:
-    """Least run of lost samples that stands out by five sigma of the envelope, at least half a period."""
-    width = max(1, min(256, horizon))
+def _envelope_noise(times: np.ndarray, period: float, width: int) -> float:
+    """One sigma of the minima of blocks, s."""
+    width = max(1, min(width, len(times) // 4))
     envelope = forward_min(times - period * np.arange(len(times)), width)[: len(times) - width + 1 : width]
-    noise = robust_sd(np.diff(envelope)) / period
-    return max(1, math.ceil(min(5 * noise + 0.5, 1e9)))
+    return robust_sd(np.diff(envelope))
 
 
-def level_slope(times: np.ndarray, period: float, width: int, lag: int) -> float:
-    """The local period, from minima of blocks of `width` rows, `lag` blocks apart; losses are folded away."""
+def level_slope(times: np.ndarray, period: float, width: int, apart: int) -> float:
+    """The local period, from minima of blocks of `width` rows, `apart` rows from each other; losses are folded away."""
+    lag = max(1, apart // width)
     blocks = _blocks(times, period, width).min(axis=1)
     if len(blocks) < 4 * lag:
         return period

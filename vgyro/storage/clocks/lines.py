@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import solveh_banded
 
-KNOT_BINS = 24  # bins from knot to knot of a line that bends
+KNOT_BINS = (24, 8)  # bins from knot to knot of a line that bends; the second if the first does not bend enough
 MIN_BEND_BINS = 48
+LEVEL_BINS = 24
 BEND = 1.5  # variance about the straight line over that about the bent one
 MIN_OWN_BINS = 8  # a piece with fewer takes the slope of the others
+MOST_OFF = 0.1  # by which the period of a piece, or a stretch of it, may differ from the usual one
 PARTS = 8
 MIN_PART_BINS = 4
 DRIFT_SIGMAS = 5.0
@@ -132,7 +134,7 @@ def _without_stalls(points: list[tuple[np.ndarray, np.ndarray]], slope: float) -
     for x, y in points:
         rest = y - slope * x
         # A running level, lest slow drift be taken for a stall.
-        width = max(1, min(KNOT_BINS, len(rest)))
+        width = max(1, min(LEVEL_BINS, len(rest)))
         blocks = np.arange(len(rest)) // width
         level = np.array([np.median(rest[blocks == block]) for block in range(blocks[-1] + 1)]) if len(rest) else rest
         rest = rest - level[blocks]
@@ -145,21 +147,26 @@ def _line(x: np.ndarray, y: np.ndarray, weight: np.ndarray, slope: float, period
     if not len(x):
         return Line(period, edge, slope * edge)
     if len(x) >= MIN_OWN_BINS:
-        slope = _pooled([(x, y)], [weight], [np.ones(len(x), dtype=bool)])[0]
+        own = _pooled([(x, y)], [weight], [np.ones(len(x), dtype=bool)])[0]
+        # Stamps of no sense: the slope of all pieces is the safer one.
+        slope = own if abs(own - slope) < MOST_OFF * (period + slope) else slope
     straight = y - slope * x
     offset = float(np.average(straight, weights=weight))
     if len(x) >= MIN_BEND_BINS:
-        knots, values = _bent(x, y - slope * x - offset, weight)
-        rest = straight - offset - np.interp(x, knots, values)
-        if float((straight - offset).var()) > BEND * float(rest.var()) + 1e-24:
-            knots, values = _to_edges(knots, values, edge)
-            return Line(period, knots, values + slope * knots + offset)
+        best, scatter = (edge, np.zeros(2)), float(straight.var())
+        for spacing in KNOT_BINS:
+            knots, values = _bent(x, straight - offset, weight, spacing)
+            rest = float((straight - offset - np.interp(x, knots, values)).var())
+            gentle = np.abs(np.diff(values)) < MOST_OFF * (period + slope) * np.diff(knots)
+            if scatter > BEND * rest + 1e-24 and gentle.all():
+                best, scatter = _to_edges(knots, values, edge), rest
+        return Line(period, best[0], best[1] + slope * best[0] + offset)
     return Line(period, edge, slope * edge + offset)
 
 
-def _bent(x: np.ndarray, y: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least-squares line with a knot at every 24th bin."""
-    count = len(x) // KNOT_BINS + 1
+def _bent(x: np.ndarray, y: np.ndarray, weight: np.ndarray, spacing: int) -> tuple[np.ndarray, np.ndarray]:
+    """Least-squares line with a knot every so many bins."""
+    count = len(x) // spacing + 1
     knots = np.quantile(x, np.linspace(0, 1, count))
     left = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, count - 2)
     right = (x - knots[left]) / (knots[left + 1] - knots[left])

@@ -17,6 +17,7 @@ TAIL = 64  # rows that must follow a loss of arrival stamps
 WHOLE = 0.3  # periods by which a lasting step may differ from whole ones
 WHOLE_SHARE = 1e-3  # … and this share of itself
 LONG_STEP = 1.5  # periods
+SURELY = 0.05  # periods below a level, for a row to lie before it rose
 
 
 class Found(NamedTuple):
@@ -116,7 +117,7 @@ class LossFinder:
         the first half of the horizon is not above the second by half a period, as it is while a stall is caught up.
         """
         grid, width = self.judgement, self.judgement.horizon
-        self._period = period = level_slope(times[low:high], self._period, min(256, width), 8)
+        self._period = period = level_slope(times[low:high], self._period, min(256, width), 2 * width)
         rest = times - period * np.arange(len(times))
         known = self._raise
         raised = rest.copy()
@@ -129,7 +130,7 @@ class LossFinder:
         # Rows too near the end of a piece are not judged.
         stop = min(high, len(times) - TAIL + 1) if last else high
         limit = (grid.least_loss - 0.5) * period
-        scan = _Scan(raised, ahead, lasts, period, limit, width, max(0.0, float(grid.least_loss - 1)) * period / 2)
+        scan = _Scan(raised, ahead, lasts, period, limit, width, grid.noise)
         found = scan.run(max(low, 1), stop)
         shifts = np.zeros(high)
         shifts[found.rows] = found.shift
@@ -165,10 +166,10 @@ class _Scan:
         period: float,
         limit: float,
         width: int,
-        slack: float,
+        noise: float,
     ) -> None:
         self.raised, self.ahead, self.lasts = raised, ahead, lasts
-        self.period, self.limit, self.width, self.slack = period, limit, width, slack
+        self.period, self.limit, self.width, self.noise = period, limit, width, noise
         self._first = backward_min(raised, width)
 
     def run(self, low: int, stop: int) -> Found:
@@ -215,22 +216,26 @@ class _Scan:
         return np.where(np.isfinite(step), step, -np.inf)
 
     def _height(self, step: np.ndarray, row: int, hit: int) -> float:
-        """The step once the rows just before it have left the horizon ahead, yet with as many rows still to come."""
+        """The median step of the rows after it, as long as there are as many to come: the rows just before it, and the
+        next loss, may spoil some."""
         settle = min(SETTLE, max(1, (len(self.ahead) - row - hit) // 2))
-        return float(step[min(hit + settle, len(step)) - 1])
+        return float(np.median(step[hit : hit + settle]))
 
     def _place(self, row: int, shift: float, stop: int) -> int:
-        """The loss comes after the last row that is still well below the new level."""
+        """The loss comes after the last row that is still below the new level."""
         end = min(row + SETTLE, stop)
         level = float(self.raised[max(0, row - self.width) : row].min()) + shift
-        low = np.flatnonzero(self.raised[row:end] < level - self.period / 2)
-        return min(row + int(low[-1]) + 1, stop - 1) if len(low) else row
+        low = np.flatnonzero(self.raised[row:end] < level - max(SURELY * self.period, 3 * self.noise))
+        row = min(row + int(low[-1]) + 1, stop - 1) if len(low) else row
+        # A row that is on the wrong side after all must not hide the next loss, or make one.
+        self.raised[row : row + SETTLE] = np.maximum(self.raised[row : row + SETTLE], level)
+        return row
 
     def _weigh(self, height: float) -> tuple[int, float]:
         """Lost samples and the shift to take away: whole periods, or all of it if it is not whole."""
         height = max(height, self.limit)
         count = int(np.rint(height / self.period))
-        tolerance = max(WHOLE * self.period, self.slack) + WHOLE_SHARE * height
+        tolerance = max(WHOLE * self.period, 4 * self.noise) + WHOLE_SHARE * height
         if count and abs(height - count * self.period) <= tolerance:
             return count, count * self.period
         return 0, height

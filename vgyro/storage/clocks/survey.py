@@ -200,7 +200,7 @@ class _Pass:
             samples=self.kept,
             rate_hz=1 / fit.period,
             rate_sd_hz=fit.period_sd / fit.period**2,
-            drift_ppm=None if fit.drift is None else units.parts_per_million(fit.drift),
+            drift_ppm=None if fit.drift is None else round(units.parts_per_million(fit.drift), 6),
             jitter_s=judgement.jitter,
             resolution_s=judgement.resolution,
             wrap_s=None if wrap is None else wrap * rules.scale,

@@ -31,7 +31,7 @@ def backward_min(values: np.ndarray, width: int) -> np.ndarray:
 
 def midmean(values: np.ndarray) -> float:
     """Mean of what lies between the 16th and the 84th percentile, both included."""
-    low, high = np.quantile(values, [0.16, 0.84])
+    low, high = np.quantile(values, 0.16, method="lower"), np.quantile(values, 0.84, method="higher")
     return float(values[(values >= low) & (values <= high)].mean())
 
 
@@ -50,7 +50,7 @@ def rough_period(times: np.ndarray) -> tuple[float, int]:
     """The usual advance from row to row, however rows are bundled, and the lag that told; 0 or less: no advance.
 
     The shortest lag m (1, 2, 4 …) over which the advance varies by less than 2 % gives it; single steps also if they
-        vary by less than 25 % and less than 5 % of them are below half of it, as lost samples spoil longer lags. Lags at
+    vary by less than 25 % and less than 5 % of them are below half of it, as losses spoil longer lags. Lags at
     which it is not within a factor of 1.5 of the advance over n/8 rows are passed over: m rows are part of a burst.
     times : float64 [n], n >= 2
     """
@@ -94,6 +94,9 @@ def refined_period(times: np.ndarray, period: float, rough_lag: int) -> float:
         centre = middle if rough else 0.0
         fold = excess - centre - np.rint(excess - centre)
         sharp = float(np.quantile(np.abs(fold), 0.84)) < 0.25
+        if rough:
+            # Whole bursts would fold away as well.
+            sharp = float(np.quantile(np.abs(excess - middle), 0.75)) < 0.25
         change = (centre + midmean(fold) if sharp else middle) / lag
         if abs(change) < MOST_OFF and (sharp or lag >= rough_lag):
             period *= 1 + change
