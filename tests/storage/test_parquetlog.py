@@ -51,7 +51,7 @@ def test_one_file(read, values, tmp_path):
     record = frames.integrity
     assert (record.status, record.frames.good, record.segments, record.values) == ("good", COUNT, 1, "counts")
     assert record.duration_s == pytest.approx(COUNT / 100)
-    assert record.files[0].compression == "parquet"
+    assert record.files[0].compression == "none"
 
 
 @pytest.mark.parametrize(
@@ -109,14 +109,38 @@ def test_repeated_rows_are_dropped(read, values, tmp_path):
     assert (frames.integrity.frames.repeated, frames.integrity.frames.good) == (1, COUNT)
 
 
-def test_rows_without_a_value_are_damage(read, values, tmp_path):
+def test_rows_without_any_value_are_lost(read, values, tmp_path):
     holes = values.astype(float)
-    holes[700:710, 1] = np.nan
+    holes[700:710] = np.nan
     frames = read(write(tmp_path / "a.parquet", holes))
     record = frames.integrity
     assert (record.frames.good, record.frames.bad, record.frames.lost) == (COUNT - 10, 10, 10)
-    assert (record.damage[0].start, record.damage[0].stop) == (700, 710)
+    (gap,) = record.gaps
+    assert (gap.time, gap.frames_lost) == (pytest.approx(7.0), 10)
     assert frames.time[700] == pytest.approx(7.10)
+    assert (frames.segment[699], frames.segment[700]) == (0, 1)
+
+
+def test_a_channel_has_gaps_of_its_own(read, values, tmp_path):
+    holes = values.astype(float)
+    holes[700:710, 1] = np.nan
+    holes[5, 2] = np.inf
+    frames = read(write(tmp_path / "a.parquet", holes))
+    record = frames.integrity
+    assert (record.frames.good, record.frames.bad, record.frames.lost) == (COUNT, 0, 0)
+    assert [record.channels[name].missing for name in AXES] == [0, 10, 1]
+    assert np.array_equal(frames.counts["gyro_x"], values[:, 0])
+    assert np.isnan(frames.counts["gyro_y"][700:710]).all()
+    assert "gyro_z is infinite in 1 sample: they count as missing" in record.warnings
+
+
+def test_one_bad_file_of_three_is_named_and_the_others_are_read(read, values, tmp_path):
+    paths = [write(tmp_path / f"{index}.parquet", values[index * 1000 : (index + 1) * 1000]) for index in range(3)]
+    paths[1].write_bytes(paths[1].read_bytes()[:-100])
+    frames = read(paths)
+    assert frames.integrity.frames.good == 2000
+    assert frames.integrity.status == "suspect"
+    assert str(paths[1]) in frames.integrity.reasons[0]
 
 
 def test_wrong_column_asks_whether_another_was_meant(read, values, tmp_path):
@@ -132,11 +156,11 @@ def test_what_is_not_a_log(read, values, tmp_path):
     (tmp_path / "a.parquet").write_bytes(b"not parquet at all")
     (tmp_path / "b.parquet").write_bytes(b"")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(DataError, match="not a readable Parquet file"):
+    with pytest.raises(DataError, match="column"):
         read(tmp_path / "a.parquet")
     with pytest.raises(DataError, match="is empty: 0 bytes"):
         read(tmp_path / "b.parquet")
-    with pytest.raises(DataError, match=r"holds no \.parquet file"):
+    with pytest.raises(DataError, match="is an empty folder"):
         read(tmp_path / "empty")
     with pytest.raises(DataError, match="no such file"):
         read(tmp_path / "c.parquet")

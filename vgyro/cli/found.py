@@ -7,6 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -193,20 +194,58 @@ def _array_lines(looks: Sequence[Look], array: ArrayDraft, together: bool) -> li
     if together:
         lines.append("  array      the files hold one gyro each and are about as long: one array (else: --separate)")
     lines.append(f"  time       {first.roles.time or 'none: by the rate that you gave'}")
-    for gyro in array.gyros:
-        unit = gyro.get("unit") or f"counts of {gyro['scale']:g} deg/s"
-        place = array.places.get(gyro["name"], {"column": gyro.get("column")})
-        where = ", ".join(f"{key} {value}" for key, value in place.items() if key != "column")
-        lines.append(
-            f"  gyro       {gyro['name']}: column {place['column']}{f' ({where})' if where else ''}, axis {gyro['axis']},"
-            f" {unit}: {array.why[gyro['name']]}"
-        )
-    for one in array.temperatures:
-        lines.append(f"  thermometer {one['name']}, °C")
+    lines += _gyro_lines(array)
+    if array.temperatures:
+        lines.append(f"  thermo     {', '.join(one['name'] for one in array.temperatures)}: °C")
     if array.other:
         lines.append("  not used   " + "; ".join(f"{column} ({what})" for column, what in array.other.items()))
     if looks[0].unused:
         lines.append("  not used   tables with gyros: " + ", ".join(looks[0].unused))
+    return lines
+
+
+def _gyro_lines(array: ArrayDraft) -> list[str]:
+    """A line for all gyros whose unit is known in the same way."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for gyro in array.gyros:
+        unit = gyro.get("unit") or f"counts of {gyro['scale']:g} deg/s"
+        groups.setdefault((unit, array.why[gyro["name"]].split(":")[0]), []).append(gyro)
+    lines = []
+    for (unit, _), gyros in groups.items():
+        told = ", ".join(f"{gyro['name']} (axis {gyro['axis']}{_where(array, gyro)})" for gyro in gyros)
+        lines.append(f"  gyro{'s' if len(gyros) > 1 else ' '}      {told}")
+        lines.append(f"  unit       {unit}: {array.why[gyros[0]['name']]}")
+    return lines
+
+
+def _where(array: ArrayDraft, gyro: dict[str, Any]) -> str:
+    """Where a gyro stands, if not in a column of its name."""
+    place = array.places.get(gyro["name"], {"column": gyro.get("column")})
+    parts = [f"{key} {place[key]}" for key in ("file", "table") if key in place]
+    parts += [f"{column} {value}" for column, value in place.get("where", {}).items()]
+    if place["column"] != gyro["name"]:
+        parts.insert(0, f"column {place['column']}")
+    return "".join(f", {part}" for part in parts)
+
+
+def _clock_lines(record: Integrity) -> list[str]:
+    """What the stamps of each stream are; what is the same of several is said once."""
+    said: dict[str, list[str]] = {}
+    for clock in record.clocks:
+        said.setdefault(f"{clock['meaning']}: {clock['why']}", []).append(clock["stream"])
+    lines = [
+        f"  clock      {text}" + (f" ({', '.join(streams)})" if len(said) > 1 else "") for text, streams in said.items()
+    ]
+    for clock in record.clocks:
+        known = clock["alignment"]
+        if known and known["by"] == "common motion":
+            lines.append(
+                f"  joined     {clock['stream']} begins {known['offset_s']:+.4f} s after {known['to']}"
+                f" ({known['offset_low_s']:.4f} to {known['offset_high_s']:.4f}), its clock is {known['drift_ppm']:+.1f} ppm"
+                f" fast ({known['drift_low_ppm']:.1f} to {known['drift_high_ppm']:.1f}): by the motion in common"
+            )
+        elif known:
+            lines.append(f"  joined     {clock['stream']} begins {known['offset_s']:+.6g} s after {known['to']}: by the stamps")
     return lines
 
 
@@ -226,13 +265,13 @@ def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | Non
     lines = [f"  {draft.name}:" if len(found.drafts) > 1 else ""]
     lines.append(f"  samples    {frames.good} at {record.rate_hz:.6g} Hz, {record.duration_s:.6g} s; {frames.lost} lost,"
                  f" {frames.bad} damaged, {frames.repeated} repeated")  # fmt: skip
+    lines += _clock_lines(record)
     for clock in record.clocks:
-        lines.append(f"  clock      {clock['meaning']}: {clock['why']}")
         if draft.log is not None and draft.log.time is not None:
             draft.log.meaning = f"found to be {clock['meaning']}"
             draft.log.time_unit = draft.log.time_unit or clock["unit"]
     lines += [f"  {'suspect':<10} {text}" for text in record.reasons] + [f"  {'note':<10} {text}" for text in record.warnings]
-    moving = f", moves from {_stretches(stretches)}" if stretches and share > 0 else ""
+    moving = f", moves from {_stretches(stretches)}" if 0 < share < 1 - MOVES else ""
     lines.append(f"  kind       {draft.kind}: {100 * share:.0f} % at rest{moving}")
     return [line for line in lines if line]
 

@@ -53,7 +53,7 @@ class Look:
 def look_at(path: Path) -> Look:
     """Open a log and guess the role of every column.  raises : DataError if it is no log, or holds no gyro"""
     opened = open_log(path, Log())
-    found = [(table, roles_of(table.columns, head_of(opened, table))) for table in opened.tables]
+    found = [(table, roles_of(table.columns, head_of(opened, table), table.name)) for table in opened.tables]
     gyros = [(table, roles) for table, roles in found if roles.gyros]
     if not gyros:
         there = "; ".join(_columns(table) for table in opened.tables)

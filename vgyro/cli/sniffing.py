@@ -13,6 +13,7 @@ from vgyro.errors import DataError
 from vgyro.log import Log
 from vgyro.storage.frames import channel_watches
 from vgyro.storage.inputs import files_inside, read_board
+from vgyro.storage.layout import kept_channels
 from vgyro.storage.logs.families import family_of, open_log
 from vgyro.storage.logs.roles import roles_of
 from vgyro.storage.logs.table import LogFile, LogTable
@@ -72,25 +73,30 @@ def measured_rate(path: Path, board: Board) -> float | None:
 
 
 def board_of_columns(path: Path, boards: Path) -> tuple[Board | None, list[str]]:
-    """The board each of whose gyros has a column of its name with values in its range, and why; None where none has."""
+    """The board whose counts a log holds, and why; None where no board is sure.
+
+    It is sure where every channel of the board has a column of its name, and the gyros hold whole numbers within its
+    rails. Names alone are not enough: gx, gy and gz stand in many a log, in many a unit.
+    """
     opened = opened_log(path)
     for board in all_boards(boards):
         for table in opened.tables:
-            there = {column.name for column in table.columns}
-            fields = [next((name for name in (gyro.field, gyro.name) if name in there), None) for gyro in board.gyros]
-            if None not in fields and in_range(opened, table, board, [str(name) for name in fields]):
-                return board, [f"guessed: {path.name} has a column for each of its gyros, with values in its range"]
+            there = set(_names(table))
+            if set(kept_channels(board)) <= there and holds_counts(opened, table, board):
+                return board, [f"guessed: {path.name} has a column for each of its channels, with counts in its range"]
     return None, []
 
 
-def in_range(opened: LogFile, table: LogTable, board: Board, columns: list[str]) -> bool:
-    """Are the values of the gyros within the rails of the board, most of them, and whole where it gives counts?"""
+def holds_counts(opened: LogFile, table: LogTable, board: Board) -> bool:
+    """Are the gyros' columns whole numbers, most of them within the board's rails? Not where it has no rails."""
+    columns = [gyro.field for gyro in board.gyros]
     batch = next(iter(opened.rows(table.name, columns))).batch
-    floating = any(np.any(values != np.rint(values)) for values in map(_known, batch.columns))
-    watches = channel_watches(board, rates=floating)
-    for gyro, column in zip(board.gyros, batch.columns, strict=True):
-        values, watch = _known(column), watches[gyro.field]
-        if not len(values) or np.mean((values <= watch.low) | (values >= watch.high)) > MOST_OUT_OF_RANGE:
+    watches = channel_watches(board)
+    for name, column in zip(columns, batch.columns, strict=True):
+        values, watch = _known(column), watches[name]
+        if not len(values) or not np.isfinite(watch.high) or np.any(values != np.rint(values)):
+            return False
+        if np.mean((values <= watch.low) | (values >= watch.high)) > MOST_OUT_OF_RANGE:
             return False
     return True
 
@@ -125,7 +131,7 @@ def log_draft(path: Path, board: Board) -> LogDraft:
     return LogDraft(
         family=opened.family,
         there=list(there),
-        time=roles_of(table.columns, head).time,
+        time=roles_of(table.columns, head, table.name).time,
         table=table.name if len(opened.tables) > 1 else None,
         places={name: column for name, column in columns.items() if name != column},
         form=list(table.text),

@@ -103,10 +103,8 @@ class Joined:
                 "drift_ppm": fit.drift_ppm, "drift_low_ppm": fit.drift_low, "drift_high_ppm": fit.drift_high,
                 "by": "common motion",
             }  # fmt: skip
-        at = positions(Stream(frames.time, np.empty(0), other.rate_hz), readings)
         paired = one_clock and self._kind in AT_REST
-        if paired:
-            at = np.rint(at)
+        at = nearest(frames.time, readings) if paired else positions(Stream(frames.time, readings, other.rate_hz), readings)
         segment = stretches(frames.time, other.rate_hz)
         gain = noise_gain(at[np.isfinite(at)])
         other.placing.alignment = {**found, "to": first.placing.intake.stream.name, "interpolated": not paired,
@@ -131,3 +129,13 @@ class Joined:
 
     def _gyros(self, whole: Whole) -> list[Gyro]:
         return [gyro for gyro in self._board.gyros if gyro.field in whole.frames.counts]
+
+
+def nearest(time: np.ndarray, readings: np.ndarray) -> np.ndarray:
+    """The sample nearest to each reading, as a position; NaN where none is within half a step of its neighbours."""
+    after = np.clip(np.searchsorted(time, readings), 1, max(len(time) - 1, 1))
+    if len(time) < 2:
+        return np.full(len(readings), np.nan)
+    near = np.where(readings - time[after - 1] < time[after] - readings, after - 1, after)
+    usual = np.median(np.diff(time))
+    return np.where(np.abs(time[near] - readings) <= usual / 2, near, np.nan).astype(float)

@@ -55,6 +55,7 @@ COVARIANCE = re.compile(r"covariance|variance|bias|clip|error|status|device|cali
 RAD_NOISE = 0.008
 """Noise of a sample below this is that of a MEMS gyro in rad/s; above, in deg/s: 0.004 to 0.03 deg/s/√Hz at 50 to
 200 Hz make 0.02 to 0.3 deg/s, which is 0.0003 to 0.005 rad/s."""
+AXES = ("x", "y", "z")
 FEW_IDS = 64
 STEADY = 0.95
 CELSIUS = (-60.0, 150.0)
@@ -85,20 +86,29 @@ class Roles:
     other: Mapping[str, str]
 
 
-def roles_of(columns: Sequence[LogColumn], head: Mapping[str, np.ndarray]) -> Roles:
+def roles_of(columns: Sequence[LogColumn], head: Mapping[str, np.ndarray], table: str = "") -> Roles:
     """Guess the roles of a table's columns.
 
-    head : some rows of the table, column → values (text as objects)
+    head : some rows of the table, column → values (text as objects);  table : its name, which says what is in it where
+           the columns have no names of their own
     """
     kinds: dict[str, Kind] = {column.name: _kind_of(column, head[column.name]) for column in columns}
+    axes: dict[str, str] = {}
     if not any(kind == "gyro" for kind in kinds.values()):
-        _nameless(columns, head, kinds)
+        about = _kind_of_table(table)
+        if about in (None, "gyro"):
+            _nameless(columns, head, kinds)
+            guessed = [name for name, kind in kinds.items() if kind == "gyro"]
+            if about == "gyro" and len(guessed) == len(AXES):
+                axes = dict(zip(guessed, AXES, strict=True))
     times = [name for name, kind in kinds.items() if kind == "time"]
     time = min(times, key=lambda name: (_rank(name), list(kinds).index(name)), default=None)
     identity = next((name for name, kind in kinds.items() if kind == "id"), None)
     ids = _ids(head[identity]) if identity is not None else ()
+    # Rows of one gyro follow each other only among those of one id.
+    rows = slice(None) if identity is None else head[identity] == head[identity][0]
     gyros = tuple(
-        GyroGuess(column.name, axis_of(column.name), *unit_of(column, head[column.name]))
+        GyroGuess(column.name, axes.get(column.name) or axis_of(column.name), *unit_of(column, head[column.name][rows]))
         for column in columns
         if kinds[column.name] == "gyro"
     )
@@ -106,6 +116,15 @@ def roles_of(columns: Sequence[LogColumn], head: Mapping[str, np.ndarray]) -> Ro
     used = {time, identity, *(gyro.column for gyro in gyros), *temperatures}
     other = {name: _say(name, kind, head[name]) for name, kind in kinds.items() if name not in used}
     return Roles(time, gyros, temperatures, identity, ids, other)
+
+
+def _kind_of_table(name: str) -> Kind | None:
+    """What a table holds, by its name; None where that says nothing."""
+    words = words_of(name)
+    if any(word in ACCELERATION_WORDS for word in words):
+        return "acceleration"
+    of_sensors = ("gyro", "magnetic field", "pressure", "temperature", "angle")
+    return next((kind for word in words for kind, form in NAMES if kind in of_sensors and re.fullmatch(form, word)), None)
 
 
 def _say(name: str, kind: Kind, values: np.ndarray) -> str:
@@ -185,7 +204,7 @@ def words_of(name: str) -> list[str]:
 
 def axis_of(name: str) -> str:
     """x, y or z where the name ends so or has an index 0, 1, 2; else z: gyros without an axis are one array."""
-    index = re.search(r"\\[([012])\\]$", name)
+    index = re.search(r"\[([012])\]$", name)
     if index:
         return "xyz"[int(index.group(1))]
     for word in reversed(words_of(name)):
