@@ -29,7 +29,11 @@ class Motion(NamedTuple):
 
 
 def random_motion(
-    rng: np.random.Generator, rms: float, bursts: tuple[tuple[float, float], ...] = (), low: float = 0.2, high: float = 4.0
+    rng: np.random.Generator,
+    rms: float,
+    bursts: tuple[tuple[float, float], ...] = (),
+    low: float = 0.2,
+    high: float = 4.0,
 ) -> Motion:
     """Band-limited random motion: forty sinusoids."""
     return Motion(rng.uniform(low, high, 40), rng.uniform(0, 2 * np.pi, 40), rms, bursts)

@@ -1,4 +1,4 @@
-"""Gyros of several clocks on one time, and delays between the gyros of one board, from the motion they have in common."""
+"""Gyros of several clocks on one time, and delays between gyros of one board, from their common motion."""
 
 from vgyro.alignment.clock import (
     AMBIGUOUS,

@@ -8,9 +8,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from vgyro.alignment.blocks import block_numbers
-from vgyro.alignment.coarse import Candidate, search
-from vgyro.alignment.pair import Line, PairFit, fit_line
+from vgyro.alignment.coarse import search
+from vgyro.alignment.growth import (
+    MOST_BLOCKS,
+    NEAR_S,
+    RIVAL_ODDS,
+    apart,
+    fit_window,
+    grow,
+    odds,
+    offset,
+    score,
+    unexplained,
+)
+from vgyro.alignment.pair import Line, PairFit
 from vgyro.alignment.streams import Band, Stream, highest_cutoff, low_pass
 from vgyro.errors import DataError
 from vgyro.units import parts_per_million
@@ -21,12 +32,9 @@ FALSE_ALARM = 1e-3
 MOST_DRIFT_PPM = 1000.0
 CUTOFFS_HZ = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 SEARCH_HZ = 4.0
-MOST_BLOCKS = 300
-PERIODS = 30  # parts of the recording from each of which the blocks that move most are taken
-RIVAL_ODDS = 20.0  # log likelihood ratio, doubled, below which two offsets cannot be told apart
 RIVAL_SHARE = 1 / 3  # of the evidence of the best: less is no rival
-NEAR_S = 0.02  # offsets that are the same
 CONFIDENCE = 0.95
+EVERYWHERE = (-math.inf, math.inf)
 
 
 class Evidence(NamedTuple):
@@ -38,7 +46,8 @@ class Evidence(NamedTuple):
     compared_s  : time that was compared, s
     cutoff_hz   : band of the estimate
     rival_s     : the offset that explains the streams next best; NaN if there is none
-    rival_odds  : twice the log likelihood ratio against it; infinite if there is none
+    rival_odds  : twice the log likelihood ratio against it, after an allowance of a tenth of the unexplained power;
+                  below 20 the two cannot be told apart; infinite if there is none
     """
 
     correlation: float = math.nan
@@ -124,19 +133,19 @@ def relative_clock(
         return _nothing(TOO_SHORT, starts)
     most_drift = 1e-6 * most_drift_ppm
     found = search(*bands, most_offset_s, most_drift)
-    fits = [fit for start in found.candidates if (fit := _grown(*bands, start, most_drift)) is not None]
+    fits = grow(*bands, found.candidates, most_drift)
     chances = [_chance_log10(fit, found.tried) for fit in fits]
     good = [fit for fit, chance in zip(fits, chances, strict=True) if chance < math.log10(false_alarm)]
     if not good:
-        best = max(fits, key=_score, default=None)
+        best = max(fits, key=score, default=None)
         evidence = Evidence() if best is None else _evidence(best, min(chances), SEARCH_HZ, None)
         return _nothing(NO_COMMON_MOTION, starts, evidence)
-    first = max(good, key=_score)
+    first = max(good, key=score)
     rival = _rival(first, good)
     fit, cutoff = first, bands[0].cutoff_hz
     for band_hz in [hz for hz in CUTOFFS_HZ if hz <= highest and hz != cutoff]:
         pair = _bands(one, two, band_hz)
-        again = None if pair is None else _full(*pair, first.line, most_drift)
+        again = None if pair is None else fit_window(*pair, first.line, most_drift, EVERYWHERE, MOST_BLOCKS)
         if again is not None and again.covariance[0, 0] < fit.covariance[0, 0]:
             fit, cutoff = again, band_hz
     evidence = _evidence(fit, _chance_log10(first, found.tried), cutoff, rival)
@@ -162,75 +171,18 @@ def _bands(one: Stream, two: Stream, cutoff_hz: float) -> tuple[Band, Band] | No
     return bands if min(len(band.time) for band in bands) > 1 else None
 
 
-def _grown(reference: Band, other: Band, start: Candidate, most_drift: float) -> PairFit | None:
-    """From the piece in which a candidate was found to all of the recording, twice as far at a time."""
-    line, middle = start.line, (start.start_s + start.stop_s) / 2
-    reach = (start.stop_s - start.start_s) / 2
-    whole = max(middle - reference.time[0], reference.time[-1] - middle)
-    while reach < whole:
-        fit = _full(reference, other, line, most_drift, (middle - reach, middle + reach))
-        if fit is None:
-            return None
-        line, reach = fit.line, 2 * reach
-    return _full(reference, other, line, most_drift)
-
-
-def _full(
-    reference: Band, other: Band, line: Line, most_drift: float, window: tuple[float, float] = (-math.inf, math.inf)
-) -> PairFit | None:
-    """The fit in a window; the drift stays as it is where the motion cannot tell it from any other."""
-    inside = np.flatnonzero((reference.time >= window[0]) & (reference.time <= window[1]))
-    if not len(inside):
-        return None
-    number = block_numbers(reference.time[inside], reference.segment[inside])
-    rows, number = _most_moving(reference, inside, number)
-    fit = fit_line(reference, other, rows, number, line)
-    if fit is not None and 2 * math.sqrt(fit.covariance[1, 1]) < most_drift and abs(fit.line.drift) < 1.5 * most_drift:
-        return fit
-    return fit_line(reference, other, rows, number, line, drift=False)
-
-
-def _most_moving(reference: Band, rows: np.ndarray, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """At most MOST_BLOCKS blocks, those of the steepest rates in each part of the recording."""
-    count = int(number[-1]) + 1
-    if count <= MOST_BLOCKS:
-        return rows, number
-    power = np.bincount(number, reference.derivative[rows] ** 2, minlength=count)
-    part = np.arange(count) * PERIODS // count
-    order = np.lexsort((-power, part))
-    rank = np.empty(count, dtype=np.int64)
-    rank[order] = np.arange(count) - np.searchsorted(part[order], part[order])
-    kept = (rank < MOST_BLOCKS // PERIODS)[number]
-    return rows[kept], number[kept]
+def _rival(best: PairFit, fits: list[PairFit]) -> tuple[float, float] | None:
+    """Offset and odds of the line that explains the streams next best."""
+    others = [fit for fit in fits if apart(fit, best) > NEAR_S and score(fit) > RIVAL_SHARE * score(best)]
+    return min(((offset(fit.line), odds(best, fit)) for fit in others), key=lambda rival: rival[1], default=None)
 
 
 def _chance_log10(fit: PairFit, tried: int) -> float:
     """log10 of the chance that the best of `tried` correlations of unrelated normal series is as large."""
     if fit.independent <= 2:
         return 0.0
-    single = 0.5 * (fit.independent - 2) * math.log10(max(1 - fit.correlation**2, 1e-12))
+    single = 0.5 * (fit.independent - 2) * math.log10(unexplained(fit))
     return min(single + math.log10(tried), 0.0)
-
-
-def _score(fit: PairFit) -> float:
-    return -fit.seconds * math.log(max(1 - fit.correlation**2, 1e-12))
-
-
-def _rival(best: PairFit, fits: list[PairFit]) -> tuple[float, float] | None:
-    """Offset and odds of the line that explains the streams next best: (s, twice the log likelihood ratio)."""
-    rivals = []
-    for fit in fits:
-        apart = abs(fit.line.about(best.line.centre_s).lag_s - best.line.lag_s)
-        if apart < NEAR_S or _score(fit) < RIVAL_SHARE * _score(best):
-            continue
-        ratio = math.log(max(1 - fit.correlation**2, 1e-12) / max(1 - best.correlation**2, 1e-12))
-        rivals.append((_offset(fit.line), min(fit.seconds, best.seconds) * 2 * SEARCH_HZ * ratio))
-    return min(rivals, key=lambda rival: rival[1], default=None)
-
-
-def _offset(line: Line) -> float:
-    """Time of the reference at which the other clock reads 0."""
-    return (line.drift * line.centre_s - line.lag_s) / (1 + line.drift)
 
 
 def _evidence(fit: PairFit, chance: float, cutoff: float, rival: tuple[float, float] | None) -> Evidence:
@@ -245,8 +197,8 @@ def _clock(fit: PairFit, evidence: Evidence, starts: tuple[float, float], most_p
     if not known:
         line = Line(line.centre_s, line.lag_s, 0.0)
     lag_error = math.sqrt(fit.covariance[0, 0])
-    offset = _offset(line)
-    reach = line.centre_s - offset
+    start = offset(line)
+    reach = line.centre_s - start
     if known:
         variance = np.array([-1.0, reach]) @ fit.covariance @ np.array([-1.0, reach])
         half, drift_half = z * math.sqrt(variance), parts_per_million(z * drift_error)
@@ -258,13 +210,13 @@ def _clock(fit: PairFit, evidence: Evidence, starts: tuple[float, float], most_p
     stricter = float(stats.norm.ppf(1 - (1 - CONFIDENCE) / 4)) / z  # two questions are asked
     status = AMBIGUOUS if evidence.rival_odds < RIVAL_ODDS else FOUND
     return ClockFit(
-        offset,
-        offset - half,
-        offset + half,
+        start,
+        start - half,
+        start + half,
         drift,
         drift - drift_half,
         drift + drift_half,
-        status == FOUND and (abs(offset - stamped) > stricter * half or abs(drift) > stricter * drift_half),
+        status == FOUND and (abs(start - stamped) > stricter * half or abs(drift) > stricter * drift_half),
         status,
         evidence,
         starts,

@@ -70,7 +70,10 @@ def _drifts(seconds: float, most: float) -> np.ndarray:
 
 
 def _grid(band: Band, drift: float, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """A band on an even grid from time 0, as a clock without that drift would read; slow drift removed; and where it is known."""
+    """A band on an even grid from time 0, as a clock without that drift would read, and where it is known.
+
+    Slow drift of the gyro is removed.
+    """
     time = np.arange(0.0, band.time[-1] / (1 + drift), step) * (1 + drift)
     after = np.clip(np.searchsorted(band.time, time), 1, len(band.time) - 1)
     good = (band.segment[after] == band.segment[after - 1]) & (time >= band.time[0])
@@ -100,7 +103,10 @@ def _scores(
     cross, x_power, y_power = (fft.irfft(a * b, size) for a, b in zip(conj, plain, strict=True))
     overlap = fft.irfft(conj[2] * plain[1], size)
     lags = np.arange(1 - len(x), len(y))
-    cross, x_power, y_power, overlap = (np.concatenate((v[1 - len(x) :], v[: len(y)])) if len(x) > 1 else v[: len(y)] for v in (cross, x_power, y_power, overlap))
+    cross, x_power, y_power, overlap = (
+        np.concatenate((v[1 - len(x) :], v[: len(y)])) if len(x) > 1 else v[: len(y)]
+        for v in (cross, x_power, y_power, overlap)
+    )
     tiny = 1e-9 * max(float(x_power.max(initial=0)), float(y_power.max(initial=0)), 1e-300)
     square = np.clip(cross**2 / np.maximum(x_power * y_power, tiny**2), 0.0, 1 - 1e-9)
     return lags, np.where(overlap * step >= LEAST_OVERLAP_S, -overlap * np.log1p(-square), 0.0)

@@ -5,7 +5,7 @@ A Kaiser-windowed sinc of 32 samples: a sinusoid up to 0.85 of the Nyquist frequ
 samples take over, so that nothing is read across it. Their errors at a tenth of Nyquist are 3e-14, 1e-7, 2.3e-4 and
 0.012; at half of Nyquist 0.001, 0.022, 0.12 and 0.29.
 
-The variance of interpolated white noise over that of the samples, by the fraction of a sample (1 - fraction has the same):
+The variance of interpolated white noise over that of the samples, by the fraction f of a sample (the same at 1 - f):
 
     fraction        0      0.05   0.1    0.2    0.3    0.4    0.5     mean
     32 samples      1.000  0.999  0.994  0.979  0.961  0.946  0.940   0.970
@@ -14,7 +14,8 @@ The variance of interpolated white noise over that of the samples, by the fracti
      4 samples      1.000  0.949  0.897  0.796  0.714  0.660  0.641   0.776
      2 samples      1.000  0.905  0.820  0.680  0.580  0.520  0.500   0.667
 
-With 32 samples what is lost lies above 0.85 of Nyquist; noise below is untouched. `noise_gain` gives the figure for each position.
+With 32 samples what is lost lies above 0.85 of Nyquist; noise below is untouched. `noise_gain` gives the
+figure for each position.
 """
 
 from __future__ import annotations
@@ -58,10 +59,11 @@ def interpolate(values: np.ndarray, at: np.ndarray, segment: np.ndarray | None =
     values  : array [T], any unit, evenly sampled within each stretch; NaN where a sample is missing
     at      : array [M], positions in samples (2.5 lies between values[2] and values[3]), in any order; NaN allowed
     segment : array [T] int, the number of the gap-free stretch of each sample; none: one stretch
-    returns : array [M] of float, the unit of values; NaN outside of the series, in gaps and next to a NaN. A position on a sample
-              is that sample, also at a border.
+    returns : array [M] of float, the unit of values; NaN outside of the series, in gaps and next to a NaN. A position
+              on a sample is that sample, also at a border.
     raises  : ValueError if segment has another length than values
-    Memory beyond the result is bounded: positions are taken 32768 at a time. The error is stated at the top of this module.
+    Memory beyond the result is bounded: positions are taken 32768 at a time. The error is stated at the top
+    of this module.
     """
     values, at = np.asarray(values), np.asarray(at, dtype=float)
     room = _Room(values, segment)
@@ -72,9 +74,7 @@ def interpolate(values: np.ndarray, at: np.ndarray, segment: np.ndarray | None =
     return result
 
 
-def noise_gain(
-    at: np.ndarray, values: np.ndarray | None = None, segment: np.ndarray | None = None
-) -> np.ndarray:
+def noise_gain(at: np.ndarray, values: np.ndarray | None = None, segment: np.ndarray | None = None) -> np.ndarray:
     """Variance of interpolated white noise over that of the samples; divide a measured variance by its mean.
 
     at      : array [M], positions in samples
@@ -88,7 +88,7 @@ def noise_gain(
     room = _Room(np.asarray(values), segment)
     result = np.full(len(at), np.nan)
     for start in range(0, len(at), AT_ONCE):
-        index, fraction, half = room.around(at[start : start + AT_ONCE])
+        _, fraction, half = room.around(at[start : start + AT_ONCE])
         part = result[start : start + AT_ONCE]
         part[half == 0] = 1.0
         for width in HALF_WIDTHS:

@@ -14,6 +14,9 @@ from vgyro.alignment.streams import Band
 MOST_STEPS = 15
 SMALL_STEP = 0.01  # of a standard error: the search has ended
 FEWEST_POINTS = 16
+QUIET_QUANTILE = 0.1
+STANDS_OUT = 2.0  # power of a block in motion over that of the quiet ones
+AGREED = 0.5  # correlation of two streams in which the motion has the power of the noise
 
 
 class Line(NamedTuple):
@@ -41,6 +44,8 @@ class PairFit(NamedTuple):
     scale       : the other's scale factor over the reference's
     seconds     : time that was compared
     independent : pairs of independent values that this is worth
+    reach       : one standard deviation of the information to each side of the centre, s
+    cutoff_hz   : band of the fit
     """
 
     line: Line
@@ -49,6 +54,8 @@ class PairFit(NamedTuple):
     scale: float
     seconds: float
     independent: float
+    reach: tuple[float, float]
+    cutoff_hz: float
 
 
 class _Overlap(NamedTuple):
@@ -105,7 +112,30 @@ def fit_line(
     covariance[:used, :used] = inverse @ score_covariance(overlap.blocks, slopes, residual) @ inverse.T
     correlation = float(one @ two) / math.sqrt(float(one @ one) * float(two @ two))
     seconds = len(lever) * reference.step_s
-    return PairFit(line, covariance, correlation, scale, seconds, independent_values(overlap.blocks, one, two))
+    worth = independent_values(overlap.blocks, one, two)
+    width = math.sqrt(max(float(information @ lever**2) / float(information.sum()), 0.0))
+    reach = (line.centre_s - width, line.centre_s + width)
+    return PairFit(line, covariance, correlation, scale, seconds, worth, reach, reference.cutoff_hz)
+
+
+def agreement(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, lines: list[Line]) -> np.ndarray:
+    """Correlation of the two, without its sign, for each line: [n].
+
+    Read along straight lines between samples, which is near enough to choose.
+    """
+    time = reference.time[rows]
+    known = np.concatenate((np.diff(other.segment) == 0, [False]))
+    result = np.zeros(len(lines))
+    for k, line in enumerate(lines):
+        at = line.at(time)
+        before = np.searchsorted(other.time, at, side="right") - 1
+        good = (before >= 0) & known[before]
+        if np.count_nonzero(good) < FEWEST_POINTS:
+            continue
+        blocks = Blocks(rows[good], number[good], reference.step_s)
+        one, two = blocks.detrended(np.stack([reference.rate[rows[good]], np.interp(at[good], other.time, other.rate)]))
+        result[k] = abs(one @ two) / max(math.sqrt(float(one @ one) * float(two @ two)), 1e-300)
+    return result
 
 
 def _bread(overlap: _Overlap, lever: np.ndarray, scale: float) -> np.ndarray:
@@ -131,6 +161,28 @@ def _overlap(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray,
     blocks = Blocks(kept, number[good], reference.step_s)
     raw = np.stack([reference.rate[kept], reference.derivative[kept], two[good], slope[good]])
     columns = blocks.detrended(raw)
+    moving = _moving(blocks, columns)[blocks.block]
+    if not moving.all():
+        blocks, raw, columns = (
+            Blocks(kept[moving], blocks.block[moving], reference.step_s),
+            raw[:, moving],
+            columns[:, moving],
+        )
     if not (columns**2).sum(axis=1).all():
         return None
-    return _Overlap(blocks, time[good], columns, raw)
+    return _Overlap(blocks, time[good][moving], columns, raw)
+
+
+def _moving(blocks: Blocks, columns: np.ndarray) -> np.ndarray:
+    """Blocks in which one of the two moves: [B]; all, if the others agree too, or if none stands out.
+
+    The noise of a block at rest is far from the centre of the information and would count there as information about
+    the drift.
+    """
+    power = blocks.sums((columns[[1, 3]] / columns[[1, 3]].std(axis=1, keepdims=True)) ** 2).sum(axis=0) / blocks.size
+    moving = power > STANDS_OUT * np.quantile(power, QUIET_QUANTILE, method="lower")
+    if not moving.any():
+        return ~moving
+    quiet = columns[:, ~moving[blocks.block]]
+    agreed = abs(quiet[1] @ quiet[3]) / math.sqrt(max(float(quiet[1] @ quiet[1]) * float(quiet[3] @ quiet[3]), 1e-300))
+    return moving | (agreed > AGREED)
