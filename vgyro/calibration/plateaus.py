@@ -92,7 +92,7 @@ def average_plateaus(
 ) -> PlateauMeans:
     """Mean count of every gyro on every plateau, and its standard error by batch means.
 
-    counts      : array [T, N];  time : array [T], s
+    counts      : array [T, N], NaN where a channel has no value;  time : array [T], s
     plateaus    : (start, stop, rate) each, in order of time, the settling already left out
     rails       : counts at which the converter clips; a plateau with a clipped sample is NaN for that gyro
     whole_turns : average whole turns of the table where a plateau holds one (360°/|rate|), so that the horizontal part
@@ -119,8 +119,13 @@ def average_plateaus(
             continue
         mean[row] = part.mean(axis=0)
         error[row] = _batch_error(part)
+        for gyro in np.flatnonzero(np.isnan(mean[row])):
+            # What a channel has is taken as if there were no more.
+            own = part[~np.isnan(part[:, gyro]), gyro]
+            if len(own) >= FEWEST_BATCHES:
+                mean[row, gyro], error[row, gyro] = own.mean(), _batch_error(own[:, None])[0]
         if temperature is not None:
-            warmth[row] = np.mean(temperature[first:last], axis=0)
+            warmth[row] = _mean_of_known(temperature[first:last])
         if rails is not None:
             clipped = (part <= rails[0]).any(axis=0) | (part >= rails[1]).any(axis=0)
             mean[row, clipped] = error[row, clipped] = np.nan
@@ -128,6 +133,15 @@ def average_plateaus(
     return PlateauMeans(
         rate, mean, error, samples, (starts + stops) / 2, stops - starts, turns, direction, warmth
     )  # fmt: skip
+
+
+def _mean_of_known(values: np.ndarray) -> np.ndarray:
+    """Mean along the first axis of the values that are there; NaN where there are none."""
+    there = np.isfinite(values)
+    if there.all():
+        return np.mean(values, axis=0)
+    count = there.sum(axis=0)
+    return np.where(count > 0, np.where(there, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
 def _batch_error(part: np.ndarray) -> np.ndarray:

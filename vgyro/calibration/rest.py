@@ -22,7 +22,8 @@ def find_rest(
 ) -> np.ndarray:
     """True where the board stands still.
 
-    rates   : array [T, N], deg/s or counts, all gyros of the board, every axis; a gyro that never changes is left out
+    rates   : array [T, N], deg/s or counts, all gyros of the board, every axis; NaN where a gyro has no value. A gyro
+              that never changes is left out
     options : window_s, min_duration_s, guard_s, threshold
     segment : array [T] int; no window and no stretch goes across a gap
     returns : bool [T]
@@ -48,8 +49,7 @@ def find_rest(
     ]
     if not scores:
         return np.zeros(samples, dtype=bool)
-    needed = math.ceil(len(scores) / MOVING_SHARE)
-    score = np.sort(np.stack(scores), axis=0)[-needed]
+    score = _most(np.stack(scores))
     covered = np.zeros(samples + 1, dtype=np.int32)
     resting = starts[score < options.threshold]
     np.add.at(covered, resting, 1)
@@ -58,12 +58,35 @@ def find_rest(
     return _long_stretches(still, borders, round(options.guard_s * rate_hz), round(options.min_duration_s * rate_hz))
 
 
+def _most(scores: np.ndarray) -> np.ndarray:
+    """Of scores [N, n] the one that a quarter of the gyros reach, in each window; NaN: the gyro has no value there."""
+    known = ~np.isnan(scores)
+    if known.all():
+        return np.sort(scores, axis=0)[-math.ceil(len(scores) / MOVING_SHARE)]
+    number = known.sum(axis=0)
+    needed = np.maximum(-(-number // MOVING_SHARE), 1)
+    ordered = np.sort(np.where(known, scores, -np.inf), axis=0)
+    found = ordered[len(scores) - needed, np.arange(scores.shape[1])]
+    return np.where(number > 0, found, np.inf)
+
+
 def _scores(rate: np.ndarray, starts: np.ndarray, length: int) -> np.ndarray | None:
-    """How far each window is from rest, in quiet levels; None for a gyro that never changes."""
+    """How far each window is from rest, in quiet levels, NaN where it has too few values.
+
+    None for a gyro that never changes, or never has a value.
+    """
+    ends, there = starts + length, np.isfinite(rate)
+    if not there.all():
+        # The values that are there, one after another; a gyro at half the rate is judged by half as many.
+        place = np.concatenate([[0], np.cumsum(there)])
+        rate, starts, ends = rate[there], place[starts], place[ends]
+        if not len(rate):
+            return None
     middle = float(np.median(rate))
-    pieces = np.array_split(starts, math.ceil(len(starts) / WINDOWS_AT_ONCE))
-    mean, spread, roughness = np.concatenate([_moments(rate, middle, piece, length) for piece in pieces], axis=1)
-    if not spread.any():
+    number = math.ceil(len(starts) / WINDOWS_AT_ONCE)
+    pieces = zip(np.array_split(starts, number), np.array_split(ends, number), strict=True)
+    mean, spread, roughness = np.concatenate([_moments(rate, middle, *piece) for piece in pieces], axis=1)
+    if not (spread > 0).any():
         return None
     quiet = float(np.quantile(spread[spread > 0], QUIET_QUANTILE))
     if quiet > SMOOTH * float(np.quantile(roughness[spread > 0], QUIET_QUANTILE)):
@@ -73,16 +96,19 @@ def _scores(rate: np.ndarray, starts: np.ndarray, length: int) -> np.ndarray | N
     return np.maximum(spread, np.abs(mean - level)) / quiet
 
 
-def _moments(rate: np.ndarray, middle: float, starts: np.ndarray, length: int) -> np.ndarray:
+def _moments(rate: np.ndarray, middle: float, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Mean (less `middle`), standard deviation and that of adjacent samples, of each window: [3, n]."""
     first = int(starts[0])
-    centred = rate[first : int(starts[-1]) + length].astype(float) - middle
-    starts = starts - first
+    centred = rate[first : int(ends[-1])].astype(float) - middle
+    starts, ends = starts - first, ends - first
     sums, squares = (np.concatenate(([0.0], np.cumsum(values))) for values in (centred, centred**2))
-    steps = np.concatenate(([0.0, 0.0], np.cumsum(np.diff(centred) ** 2)))
-    mean = (sums[starts + length] - sums[starts]) / length
-    spread = np.sqrt(np.maximum((squares[starts + length] - squares[starts]) / length - mean**2, 0))
-    roughness = np.sqrt(np.maximum(steps[starts + length] - steps[starts + 1], 0) / (2 * (length - 1)))
+    steps = np.concatenate(([0.0, 0.0], np.cumsum(np.diff(centred) ** 2)))[: len(centred) + 1]
+    length = (ends - starts).astype(float)
+    length[length < FEWEST_SAMPLES] = np.nan
+    mean = (sums[ends] - sums[starts]) / length
+    spread = np.sqrt(np.maximum((squares[ends] - squares[starts]) / length - mean**2, 0))
+    begins = np.minimum(starts + 1, len(centred))
+    roughness = np.sqrt(np.maximum(steps[ends] - steps[begins], 0) / (2 * (length - 1)))
     return np.stack([mean, spread, roughness])
 
 

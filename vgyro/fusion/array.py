@@ -65,6 +65,8 @@ class ArrayRates:
     faults     : stretches in which one gyro is at fault
     temperature : [T] °C, of the board; None: not logged
     stretch_time : [S] s, time of the first sample of each gap-free stretch; None: they follow without time between
+    missing    : [T, N] of bool, samples without a value, for which `rate` holds what vgyro.fusion.missing filled in;
+                 None: there are none
     """
 
     rate: np.ndarray
@@ -78,6 +80,7 @@ class ArrayRates:
     faults: tuple[FaultEvent, ...] = ()
     temperature: np.ndarray | None = None
     stretch_time: np.ndarray | None = None
+    missing: np.ndarray | None = None
     _made: dict[Hashable, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -108,9 +111,10 @@ class ArrayRates:
         faults = tuple(one.within(first, last) for one in self.faults if one.start < last and one.stop > first)
         temperature = None if self.temperature is None else self.temperature[samples]
         stretch_time = None if self.stretch_time is None else self._stretch_times(first, last)
+        missing = None if self.missing is None else self.missing[samples]
         return replace(
             self, **columns, weights=weights, deviations=deviations, faults=faults, temperature=temperature,
-            stretch_time=stretch_time,
+            stretch_time=stretch_time, missing=missing,
         )  # fmt: skip
 
     def _stretch_times(self, first: int, last: int) -> np.ndarray:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vgyro.metrics.equal_bandwidth import Equaliser, LowPass, common_bandwidth, run_back
     from vgyro.metrics.figures import FIGURES, Figure, Reading
     from vgyro.metrics.improvement import improvement_by_draws, improvement_factor, improvement_of_deviation
+    from vgyro.metrics.lacking import cleaned_of, correlation_of, own_samples
     from vgyro.metrics.outliers import find_outliers
     from vgyro.metrics.pairs import noise_from_differences
     from vgyro.metrics.readings import counted, moments, paper_readings
@@ -52,8 +53,10 @@ __all__ = [
     "array_figures",
     "averaging_factors",
     "block_length",
+    "cleaned_of",
     "common_bandwidth",
     "correlation_matrix",
+    "correlation_of",
     "counted",
     "cross_allan",
     "dynamic_errors",
@@ -69,6 +72,7 @@ __all__ = [
     "noise_coefficients",
     "noise_density",
     "noise_from_differences",
+    "own_samples",
     "paper_readings",
     "read_curve",
     "resample",
@@ -95,6 +99,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(("improvement_by_draws", "improvement_factor", "improvement_of_deviation"), "improvement"),
         "find_outliers": "outliers",
         "noise_from_differences": "pairs",
+        **dict.fromkeys(("cleaned_of", "correlation_of", "own_samples"), "lacking"),
         **dict.fromkeys(("counted", "moments", "paper_readings"), "readings"),
         "Sampling": "sampling",
         **dict.fromkeys(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +39,7 @@ def dynamic_figures(
     options: MetricsOptions,
     sampling: Sampling | None = None,
     deviation: Callable[[int], np.ndarray | None] = _no_deviation,
+    own: Mapping[int, Mapping[str, Reading]] | None = None,
 ) -> list[dict[str, Reading]]:
     """Errors of series against the true rate, and improvement factors of the virtual gyros.
 
@@ -47,6 +48,7 @@ def dynamic_figures(
     segment   : array [T] int, number of the gap-free stretch
     sampling  : of the T samples, for the angle; None: each gap ends a stretch
     deviation : place of a series → its posterior standard deviation, array [T], deg/s; None: it has none, and no NEES
+    own       : place of a gyro that lacks values → its figures from those that it has, instead of those of its series
     returns   : S dictionaries, name → Reading; where the reference does not change, delay and what depends on it are
                 NaN with a note. Limits by moving-block bootstrap, the improvement factors with common blocks.
     """
@@ -77,6 +79,8 @@ def dynamic_figures(
         del error, sd
         readings.append(row | _shifted(errors_of(rate, truth), options))
         raw.append(units)
+    for place, row in (own or {}).items():
+        readings[place].update(row)
     drawn = resample(joined(raw), options.bootstrap, options.seed)
     for column in range(singles, len(readings)):
         readings[column].update(_factors(readings, drawn, singles, column, options.confidence))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,10 +70,17 @@ def static_figures(
     return array_figures(shared, [shared.measure(*one) for one in zip(series, filters, strict=True)], singles)
 
 
-def array_figures(shared: RestRecording, measured: Sequence[Measured], singles: int) -> StaticFigures:
+def array_figures(
+    shared: RestRecording,
+    measured: Sequence[Measured],
+    singles: int,
+    own: Mapping[int, Mapping[str, Reading]] | None = None,
+) -> StaticFigures:
     """Figures that need all series of a recording: moments with common replicates, and improvement factors.
 
     measured : S, the first `singles` are the gyros
+    own      : place of a gyro that lacks values → its figures from those that it has, which stand for what is found of
+               the gyro as it was filled in
     """
     array = _Array.of(shared, measured, singles)
     confidence = shared.options.confidence
@@ -83,6 +90,8 @@ def array_figures(shared: RestRecording, measured: Sequence[Measured], singles: 
         if shared.poses:
             row["sigma"] = replace(row["sigma"], note=f"{POSE_NOTE}; {row['sigma'].note}")
     _add_equal(readings, shared, array, confidence)
+    for place, row in (own or {}).items():
+        readings[place].update(row)
     for column in range(singles, len(measured)):
         readings[column].update(array.factors(readings, column, confidence))
     return StaticFigures([one.curves for one in measured], [one.spectrum for one in measured], readings, array.cross)

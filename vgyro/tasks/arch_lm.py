@@ -13,6 +13,13 @@ from vgyro.volatility.whiten import whiten
 from vgyro.volatility.windowed import MIN_SAMPLES
 
 
+def whitened(r: np.ndarray, array: ArraySeries) -> np.ndarray:
+    """r_t [T] of one gyro without drift, tones and correlation; NaN throughout if it lacks values."""
+    if not np.isfinite(r).all():
+        return np.full(len(r), np.nan)
+    return whiten(r, array.rate_hz, array.options.detrend_span).residual
+
+
 def series_of(array: ArraySeries, values: np.ndarray, garch: GarchWindows) -> dict[str, np.ndarray]:
     """The four series that are tested, [T, N]. They lie in one stretch: no lag bridges a gap.
 
@@ -31,6 +38,6 @@ def series_of(array: ArraySeries, values: np.ndarray, garch: GarchWindows) -> di
     return {
         "level": r,
         "detrended": detrended(r, array.options.detrend_span),
-        "whitened": np.column_stack([whiten(one, array.rate_hz, array.options.detrend_span).residual for one in r.T]),
+        "whitened": np.column_stack([whitened(one, array) for one in r.T]),
         "standardised": r / np.sqrt(variance),
     }

@@ -124,6 +124,8 @@ def read_sample(array: ArraySeries, garch: Path, dcc: Path, number: int) -> Samp
     r = window_residuals(values, here, array.definition, span, ahead, begin - first)[:, gyros]
     # The first difference of a stretch is not known.
     lost = int(np.isnan(r[:1]).any())
+    # A gyro with a model may lack values after its window: no shock, as in its weights.
+    r[window.length :] = np.nan_to_num(r[window.length :])
     place = place_columns(np.array([number]), np.array([window.start]), window.length, time, first)
     return Sample(
         r[lost:], window.length - lost, stored["log_likelihood"][gyros], stored["status"][gyros], model, gyros,

@@ -33,6 +33,7 @@ def block_means(
     """Means of blocks of `seconds` of the recording's clock; the memory is that of a row group and of the means.
 
     rails : column → counts at which the converter clips; a block with a clipped sample is NaN there
+    A column that lacks values in a block has the mean of those that are there, and NaN where there are none.
     Blocks with fewer than half as many samples as usual are left out, and so is what is cut off by a gap.
     """
     names = list(dict.fromkeys(columns))
@@ -56,7 +57,8 @@ def block_means(
 def _hide_clipped(columns: dict[str, np.ndarray], rails: Mapping[str, tuple[float, float]]) -> None:
     for name, (low, high) in rails.items():
         values = columns[name]
-        values[(values <= low) | (values >= high)] = np.nan
+        # A mean with it is infinite, which _means tells from values that are not there.
+        values[(values <= low) | (values >= high)] = np.inf
 
 
 def _starts(columns: dict[str, np.ndarray], seconds: float) -> np.ndarray:
@@ -73,8 +75,28 @@ def _means(columns: dict[str, np.ndarray], starts: np.ndarray, names: list[str])
         return np.empty((3 + len(names), 0))
     samples = np.diff(starts)
     stop = int(starts[-1])
-    sums = [np.add.reduceat(columns[name][:stop], starts[:-1]) for name in ("time", "segment", *names)]
-    return np.vstack([samples, *(total / samples for total in sums)])
+    head = [np.add.reduceat(columns[name][:stop], starts[:-1]) / samples for name in ("time", "segment")]
+    return np.vstack([samples, *head, *(_mean(columns[name][:stop], starts[:-1], samples) for name in names)])
+
+
+def _mean(values: np.ndarray, begins: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    """Means [M] of the values that are there in each block; NaN: none is, or one of them was clipped."""
+    total, count = np.add.reduceat(values, begins), samples.astype(float)
+    if np.isnan(total).any():
+        there = ~np.isnan(values)
+        total = np.add.reduceat(np.where(there, values, 0.0), begins)
+        count = np.add.reduceat(there, begins, dtype=float)
+    mean = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    mean[np.isinf(mean)] = np.nan
+    return mean
+
+
+def between(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """values [M] at time [M], s, with those that are NaN interpolated in time, and held at the ends; all NaN: as is."""
+    there = np.isfinite(values)
+    if there.all() or not there.any():
+        return values
+    return np.interp(time, time[there], values[there])
 
 
 def thermometer_of(board: Board, gyro: str) -> Temperature | None:

@@ -29,7 +29,7 @@ from vgyro.calibration.figures import VALUE
 from vgyro.config import CalibrationOptions, RestOptions
 from vgyro.errors import TooShort
 from vgyro.storage.tables import read_column
-from vgyro.tasks.block_means import BlockMeans, block_means, thermometer_of
+from vgyro.tasks.block_means import BlockMeans, between, block_means, thermometer_of
 from vgyro.tasks.calibrate_tables import Source, Test
 from vgyro.tasks.moves import moves_of
 from vgyro.units import parts_per_million
@@ -111,9 +111,11 @@ def read_rests(sources: Sequence[Source], board: Board, options: RestOptions) ->
     for kind in ("thermal", "static"):
         source = next((source for source in sources if source.recording.kind == kind), None)
         if source is not None:
-            rate_hz = source.recording.rate_hz or board.rate_hz
+            rate_hz = source.rate_hz
             rails = {} if board.adc is None else {g.field: (board.adc.low, board.adc.high) for g in board.gyros}
             means = block_means(source.frames, fields, max(1.0, 1.0 / rate_hz), rails)
+            for thermometer in board.temperatures:
+                means.values[thermometer.field] = between(means.time, means.values[thermometer.field])
             found[kind] = source.recording.name, _at_rest(means, source, board, rate_hz, options)
     return Rests(found.get("thermal"), found.get("static"))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from vgyro.board import Board, Gyro
@@ -25,19 +26,16 @@ from vgyro.dataset import AT_REST, ConstantReference, FileReference, Manifest, R
 from vgyro.log import Values
 from vgyro.storage.frames import gyro_rails
 from vgyro.storage.tables import TableWriter, read_batches, read_column, read_json
-from vgyro.tasks.block_means import block_means
+from vgyro.tasks.block_means import between, block_means
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.moves import moves_of
 from vgyro.tasks.reference_log import read_reference
 
 MOSTLY_CLIPPED = 0.01
-CONTRADICTION = 0.02
-FEWEST_STEPS = 10
-GAP_STEPS = 1.5
 
 
 def main(task: Task) -> None:
-    """inputs : frames, calibration, reference (a logged rate, or none);  outputs : rates
+    """inputs : frames, integrity, calibration, reference (a logged rate, or none);  outputs : rates
 
     options : manifest, board, recording, analysis.rest
     """
@@ -46,7 +44,7 @@ def main(task: Task) -> None:
     recording = manifest.recording(task.options["recording"])
     frames = task.input("frames")
     time = read_column(frames, "time")
-    rate_hz = sample_rate(recording, board, time)
+    rate_hz = float(read_json(task.input("integrity"))["rate_hz"])
     converter = Converter(
         board, recording, read_json(task.input("calibration"))["gyros"], values_of(manifest, recording)
     )
@@ -70,6 +68,7 @@ def main(task: Task) -> None:
         },
         "temperature": {gyro.name: converter.compensation_record(gyro) for gyro in board.gyros},
     }
+    extra |= missing_record(frames, board)
     if moves is not None:
         extra["moved"] = moves.record
     if reference is not None:
@@ -103,7 +102,7 @@ class Converter:
 
     def read_temperatures(self, frames: Path, rate_hz: float) -> None:
         """Smooth the thermometers that are needed: means of a second, then as the calibration does."""
-        sensors = {self.gyros[name]["temperature"]["sensor"] for name in self.compensations}
+        sensors = {self._sensor_of(name) for name in self.compensations}
         used = [thermometer for thermometer in self.board.temperatures if thermometer.name in sensors]
         if not used:
             return
@@ -113,8 +112,18 @@ class Converter:
             return
         for thermometer in used:
             celsius = means.values[thermometer.field] * thermometer.scale + thermometer.offset
-            smooth = smooth_temperature(celsius, 1.0 / means.seconds, segment=means.segment)
+            if not np.isfinite(celsius).any():
+                continue
+            # A thermometer slower than the means has none in some of them.
+            smooth = smooth_temperature(between(means.time, celsius), 1.0 / means.seconds, segment=means.segment)
             self._celsius[thermometer.name] = means.time, smooth
+        self.compensations = {
+            name: one for name, one in self.compensations.items() if self._sensor_of(name) in self._celsius
+        }
+
+    def _sensor_of(self, gyro: str) -> str:
+        """The thermometer whose temperature a gyro is compensated by."""
+        return str(self.gyros[gyro]["temperature"]["sensor"])
 
     def rates_of(self, raw: dict[str, np.ndarray], gyros: Sequence[Gyro] | None = None) -> dict[str, np.ndarray]:
         """Gyro → deg/s along its axis, of all or of some; a log of rates is only turned the right way round."""
@@ -127,7 +136,7 @@ class Converter:
         row = self.gyros[gyro.name]
         if gyro.name not in self.compensations:
             return to_rates(raw[gyro.field], gyro.sign, row["scale"], row["bias"])
-        celsius = np.interp(raw["time"], *self._celsius[row["temperature"]["sensor"]])
+        celsius = np.interp(raw["time"], *self._celsius[self._sensor_of(gyro.name)])
         return compensate(raw[gyro.field], celsius, gyro.sign, row["scale"], self.compensations[gyro.name])
 
     def compensation_record(self, gyro: Gyro) -> dict[str, Any]:
@@ -181,6 +190,29 @@ class Converter:
         return rates
 
 
+def missing_record(frames: Path, board: Board) -> dict[str, dict[str, int]]:
+    """Metadata of what the gyros' channels lack; empty where they lack nothing, as channels of whole numbers do.
+
+    missing   : gyro → samples without a value, which are NaN in rates.parquet
+    lost_rows : axis → samples in which no gyro of the axis has a value, where there are any
+    """
+    schema = pq.read_schema(frames)
+    chosen = [gyro for gyro in board.gyros if pa.types.is_floating(schema.field(gyro.field).type)]
+    if not chosen:
+        return {}
+    missing, lost = dict.fromkeys([gyro.name for gyro in board.gyros], 0), dict.fromkeys(board.axes, 0)
+    for raw in read_batches(frames, list(dict.fromkeys(gyro.field for gyro in chosen))):
+        gone = {gyro.name: np.isnan(raw[gyro.field]) for gyro in chosen}
+        for name, mask in gone.items():
+            missing[name] += int(mask.sum())
+        for axis in board.axes:
+            members = [gyro.name for gyro in board.array(axis)]
+            if all(name in gone and gone[name].any() for name in members):
+                lost[axis] += int(np.logical_and.reduce([gone[name] for name in members]).sum())
+    found = {"missing": missing, "lost_rows": {axis: rows for axis, rows in lost.items() if rows}}
+    return {name: record for name, record in found.items() if any(record.values())}
+
+
 def compensations_of(calibration: dict[str, Any]) -> dict[str, Compensation]:
     """Gyro → what the calibration says is to be taken off."""
     found = {}
@@ -193,19 +225,6 @@ def compensations_of(calibration: dict[str, Any]) -> dict[str, Compensation]:
                 (constant, first, second, third),
             )  # fmt: skip
     return found
-
-
-def sample_rate(recording: Recording, board: Board, time: np.ndarray) -> float:
-    """Sample rate, Hz: as declared, unless the time stamps contradict it by more than 2 %."""
-    declared = float(recording.rate_hz or board.rate_hz)
-    if time.size < FEWEST_STEPS:
-        return declared
-    steps = np.diff(time)
-    usual = steps[steps <= GAP_STEPS * np.median(steps)]
-    if usual.size == 0 or usual.mean() <= 0:
-        return declared
-    measured = 1.0 / float(usual.mean())
-    return measured if abs(measured / declared - 1) > CONTRADICTION else declared
 
 
 def rest_of(converter: Converter, frames: Path, time: np.ndarray, rate_hz: float, options: RestOptions) -> np.ndarray:
@@ -232,11 +251,10 @@ def reference_of(converter: Converter, frames: Path, time: np.ndarray, logs: lis
         if phase is None:
             axis = converter.recording.axis or converter.board.axes[0]
             names = [gyro.name for gyro in converter.board.array(axis)]
-            phase = (
-                fit_phase(converter.array(frames, names).mean(axis=1), time, reference.frequency_hz)
-                if time.size
-                else 0.0
-            )
+            rates = converter.array(frames, names) if time.size else np.zeros((0, len(names)), np.float32)
+            complete = np.isfinite(rates).all(axis=1)
+            known = slice(None) if complete.all() else complete
+            phase = fit_phase(rates[known].mean(axis=1), time[known], reference.frequency_hz) if complete.any() else 0.0
         return sinusoid(time, reference.amplitude, reference.frequency_hz, phase)
     if isinstance(reference, FileReference) and logs:
         logged, rate = read_reference(logs[0], reference)

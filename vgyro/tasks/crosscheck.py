@@ -12,13 +12,13 @@ from vgyro.config import CrossCheckOptions, FusionOptions, MetricsOptions
 from vgyro.engine.independent import printed_filter, textbook_allan_deviation
 from vgyro.fusion import FilterParameters
 from vgyro.fusion.design import information, q_for_bandwidth
-from vgyro.metrics import Sampling, allan_deviation, without_outliers
+from vgyro.metrics import Sampling, allan_deviation, own_samples, without_outliers
 from vgyro.storage.tables import read_column, read_columns, read_metadata, read_rows, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.crosscheck_rows import Row, columns_of, compare
 from vgyro.tasks.crosscheck_windows import window_rows
 from vgyro.tasks.fusion_inputs import in_motion, read_noise
-from vgyro.tasks.rates_file import has_moved, read_array
+from vgyro.tasks.rates_file import has_moved, incomplete, read_array, read_frame
 
 FILTER_SAMPLES = 2000
 FILTER_TOLERANCE = 1e-9  # of the largest rate
@@ -65,6 +65,10 @@ def filter_rows(task: Task, gyros: list[str]) -> Iterator[Row]:
 
 def _first_samples(task: Task, gyros: list[str]) -> np.ndarray:
     """Rates [T, N] of the beginning of the first stretch, deg/s."""
+    if incomplete(task.input("rates"), gyros):
+        file = read_array(task.input("rates"), gyros, task.options["axis"])
+        here = file.segment[:FILTER_SAMPLES] == file.segment[0]
+        return file.rate[:FILTER_SAMPLES][here].astype(float)
     found = read_rows(task.input("rates"), ["segment", *gyros], 0, FILTER_SAMPLES)
     here = found["segment"] == found["segment"][0]
     return np.column_stack([found[gyro][here] for gyro in gyros]).astype(float)
@@ -77,25 +81,28 @@ def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterat
     """
     curves = read_columns(task.input("allan"), ["series", "kind", "tau", "deviation"])
     names = sorted(set(curves["series"]))
-    file = read_array(task.input("rates"), [], task.options["axis"])
+    file = read_frame(task.input("rates"), gyros, task.options["axis"])
     # A recording in motion at a constant rate has a curve of rate - reference, which is not looked at here.
     if not names or not file.at_rest.any():
         return
     options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
     sampling = file.rest_sampling(options.most_lost_s)
-    rest, segment = file.at_rest, sampling.segment
+    rest, whole_segment = file.at_rest, sampling.segment
     for name in rng.permutation(names)[:ALLAN_SERIES]:
         rate = read_column(task.input("rates" if name in gyros else "fused"), str(name), float)
         rate = rate if rest.all() else rate[rest]
-        outliers = without_outliers(rate, file.rate_hz, segment, options.outlier_threshold)[1]
-        whole = sampling.missing == 0 and not outliers.any()
+        # A gyro that lacks values is measured at its own samples.
+        rate, when = own_samples(rate, sampling)
+        segment = whole_segment if when is sampling else when.segment
+        outliers = without_outliers(rate, when.rate_hz, segment, options.outlier_threshold)[1]
+        whole = when.missing == 0 and not outliers.any()
         places = np.flatnonzero((curves["series"] == name) & (curves["kind"] == "overlapping"))
         for place in np.sort(rng.permutation(places)[:ALLAN_TAUS]):
             tau, ours = float(curves["tau"][place]), float(curves["deviation"][place])
             if whole:
-                theirs = textbook_allan_deviation(rate, file.rate_hz, tau, segment)
+                theirs = textbook_allan_deviation(rate, when.rate_hz, tau, segment)
             else:
-                theirs = _by_other_engine(task, rate[~outliers], sampling.without(outliers), tau)
+                theirs = _by_other_engine(task, rate[~outliers], when.without(outliers), tau)
             yield compare(
                 f"Allan deviation, τ = {tau:.4g} s", DEFINITION if whole else LOSSES, -1, str(name), ours, theirs,
                 ALLAN_TOLERANCE * abs(ours), "deg/s",

@@ -69,8 +69,9 @@ def array_of(file: ArrayFile, temperature: np.ndarray | None) -> ArrayRates:
     unknown = ArrayNoise(np.full(gyros, math.nan), np.full(gyros, math.nan), np.eye(gyros))
     times = stretch_times(file)
     return ArrayRates(
-        file.rate, file.rate_hz, file.segment, file.at_rest, unknown, temperature=temperature, stretch_time=times
-    )
+        file.rate, file.rate_hz, file.segment, file.at_rest, unknown, temperature=temperature, stretch_time=times,
+        missing=file.missing,
+    )  # fmt: skip
 
 
 def zero_counts(path: Path, gyros: Sequence[Gyro], calibration: Sequence[Path]) -> np.ndarray:
@@ -100,7 +101,9 @@ def _extremes(path: Path, column: str) -> tuple[float, float]:
     file = pq.ParquetFile(path)
     place = file.schema_arrow.names.index(column)
     parts = [file.metadata.row_group(group).column(place).statistics for group in range(file.num_row_groups)]
-    return min(part.min for part in parts), max(part.max for part in parts)
+    # A row group in which the thermometer has no value has no extremes.
+    known = [part for part in parts if part is not None and part.has_min_max]
+    return min(part.min for part in known), max(part.max for part in known)
 
 
 def row_of(gyro: str, event: FaultEvent, start: float, stop: float, *, to_the_end: bool) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def open_array(task: Task) -> OpenArray:
         faults=tuple(event for path in task.inputs.get("faults", []) for event in read_faults(path, gyros, file)),
         deviations=deviations,
         temperature=read_temperature(file, thermometers(board, gyros)) if fusion.temperature == "auto" else None,
-        stretch_time=stretch_times(file),
+        stretch_time=stretch_times(file), missing=file.missing,
     )  # fmt: skip
     moving = in_motion(task.options["kind"], file.at_rest, file.moved)
     parameters = FilterParameters.of(fusion, moving, block_hz, analysis.get("engine", "native"))

@@ -18,20 +18,22 @@ from vgyro.metrics import (
     Correlation,
     LowPass,
     Measured,
+    Reading,
     RestRecording,
     StaticFigures,
     array_figures,
+    cleaned_of,
     common_bandwidth,
-    correlation_matrix,
+    correlation_of,
     counted,
     run_back,
-    without_outliers,
 )
 from vgyro.metrics.dynamic_figures import dynamic_figures
 from vgyro.storage.tables import read_column, read_columns, read_metadata
 from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.measure_missing import Lacking, own_moving, own_still, with_own
 from vgyro.tasks.measure_tables import Results, Rows, Series, write_results
-from vgyro.tasks.rates_file import DEVIATION, ArrayFile, FileColumns, read_array
+from vgyro.tasks.rates_file import DEVIATION, ArrayFile, FileColumns, read_frame
 
 FEWEST_SAMPLES = 3  # in the longest stretch, for an Allan deviation
 HEAD = ("time", "segment")
@@ -42,12 +44,14 @@ class Still:
     """Static figures of the series of a recording, and what they were made from.
 
     true_rate : deg/s, 0 at rest;  where : [T] samples that were taken, None: all
+    own       : place of a gyro that lacks values → its figures from those that it has
     """
 
     true_rate: float
     where: np.ndarray | None
     shared: RestRecording
     measured: list[Measured]
+    own: dict[int, dict[str, Reading]]
     figures: StaticFigures
 
 
@@ -59,16 +63,19 @@ def main(task: Task) -> None:
     options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
     axis, rates = task.options["axis"], task.input("rates")
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(axis)]
+    frame = read_frame(rates, gyros, axis)
+    lacking = Lacking.of(rates, gyros, frame, options.most_lost_s)
+    gyros = lacking.gyros
     series = [Series(rates, gyro, gyro, "", LowPass()) for gyro in gyros]
     series += fused_series(task.input("fused"), read_columns(task.input("methods")))
-    frame = read_array(rates, [], axis)
     reference = frame.reference
-    still = still_figures(task, frame, reference, series, len(gyros), options)
+    still = still_figures(task, frame, reference, series, lacking, options)
     rows = [] if still is None else [Rows(series, still.figures.readings, still.true_rate)]
     if reference is not None:
-        columns, sampling = columns_of(series), frame.sampling(options.most_lost_s)
+        columns, sampling = columns_of(series, held=lacking.filled), frame.sampling(options.most_lost_s)
+        own = {place: own_moving(lacking.own(rates, place), reference, sampling, options) for place in lacking.places}
         moving = dynamic_figures(
-            columns, reference, frame.rate_hz, frame.segment, len(gyros), options, sampling, deviations_of(series)
+            columns, reference, frame.rate_hz, frame.segment, len(gyros), options, sampling, deviations_of(series), own
         )
         rows = with_dynamic(rows, Rows(series, moving, 0.0))
     if still is not None and still.true_rate == 0:
@@ -76,16 +83,19 @@ def main(task: Task) -> None:
     figures = None if still is None else still.figures
     # Its sums and sampling are not wanted while the correlation holds several columns.
     del still
-    correlation = noise_correlation(columns_of(series[: len(gyros)]), frame, reference, options)
+    correlation = noise_correlation(columns_of(series[: len(gyros)]), frame, reference, options, lacking.places)
     of = "samples at rest" if frame.at_rest.any() else "rate - reference"
     write_results(task, Results(series, len(gyros), rows, figures, correlation, of, frame.rate_hz), options.confidence)
 
 
 def columns_of(
-    series: Sequence[Series], where: np.ndarray | None = None, less: float | np.ndarray = 0.0
+    series: Sequence[Series],
+    where: np.ndarray | None = None,
+    less: float | np.ndarray = 0.0,
+    held: Mapping[tuple[Path, str], np.ndarray] | None = None,
 ) -> FileColumns:
-    """Their rates, each read when it is asked for."""
-    return FileColumns([(one.path, one.column) for one in series], where, less)
+    """Their rates, each read when it is asked for.  held : those that are in memory"""
+    return FileColumns([(one.path, one.column) for one in series], where, less, held=held or {})
 
 
 def deviations_of(series: Sequence[Series]) -> Callable[[int], np.ndarray | None]:
@@ -121,7 +131,7 @@ def still_figures(
     frame: ArrayFile,
     reference: np.ndarray | None,
     series: list[Series],
-    singles: int,
+    lacking: Lacking,
     options: MetricsOptions,
 ) -> Still | None:
     """Figures of the samples at rest; of a recording at a constant, known rate: those of rate - reference."""
@@ -142,18 +152,24 @@ def still_figures(
     bandwidth_hz = common_bandwidth(filters, options.equal_bandwidth_hz)
     engine = task.options["analysis"].get("engine", "native")
     shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses, run_back(filters))
-    columns = columns_of(series, where, less)
+    columns, back = columns_of(series, where, less, lacking.filled), run_back(filters)
     try:
         measured = [shared.measure(values, one.low_pass) for values, one in zip(columns, series, strict=True)]
+        alone = {
+            place: own_still(lacking.own(frame.path, place)[where] - less, shared, bandwidth_hz, back)
+            for place in lacking.places
+        }
     except TooShort as reason:
         logging.warning("no static figures: %s", reason)
         return None
-    figures = array_figures(shared, measured, singles)
+    measured = with_own(measured, {place: one for place, (one, _) in alone.items()})
+    own, singles = {place: row for place, (_, row) in alone.items()}, len(lacking.gyros)
+    figures = array_figures(shared, measured, singles, own)
     clipped = read_metadata(frame.path).get("clipped", {})
     for one, row in zip(series[:singles], figures.readings, strict=False):
         if one.column in clipped:
             row["clipped"] = counted(int(clipped[one.column]))
-    return Still(true_rate, where, shared, measured, figures)
+    return Still(true_rate, where, shared, measured, own, figures)
 
 
 def with_dynamic(still: list[Rows], moving: Rows) -> list[Rows]:
@@ -173,28 +189,36 @@ def moved_figures(path: Path, series: list[Series], singles: int, still: Still) 
     moved = [replace(one, path=path) for one in series[singles:] if one.column in names]
     columns = columns_of(moved, still.where)
     own = [still.shared.measure(values, one.low_pass) for values, one in zip(columns, moved, strict=True)]
-    found = array_figures(still.shared, [*still.measured[:singles], *own], singles)
+    found = array_figures(still.shared, [*still.measured[:singles], *own], singles, still.own)
     return [Rows(moved, found.readings[singles:], float(rate))]
 
 
 def noise_correlation(
-    gyros: FileColumns, frame: ArrayFile, reference: np.ndarray | None, options: MetricsOptions
+    gyros: FileColumns,
+    frame: ArrayFile,
+    reference: np.ndarray | None,
+    options: MetricsOptions,
+    lacking: Sequence[int],
 ) -> Correlation:
-    """Correlation of the noise at rest; of the errors where the board moves and the true rate is known; else NaN."""
+    """Correlation of the noise at rest; of the errors where the board moves and the true rate is known; else NaN.
+
+    lacking : places of the gyros that lack values
+    """
     if frame.at_rest.any():
         rest = frame.rest_sampling(options.most_lost_s)
         segment, stretch = rest.segment, rest.stretch
         del rest
 
         def cleaned(rate: np.ndarray) -> np.ndarray:
-            return without_outliers(rate, frame.rate_hz, segment, options.outlier_threshold)[0]
+            return cleaned_of(rate, frame.rate_hz, segment, options.outlier_threshold)
 
         columns = replace(gyros, where=frame.at_rest, cleaned=cleaned)
-        return correlation_matrix(columns, frame.rate_hz, stretch, options.confidence)
+        return correlation_of(columns, lacking, frame.rate_hz, stretch, options.confidence)
     if reference is not None and np.isfinite(reference).sum() > len(gyros):
         known = np.isfinite(reference)
         moving = replace(gyros, where=known)
-        return correlation_matrix(moving, frame.rate_hz, frame.segment[known], options.confidence, reference[known])
+        segment, truth = frame.segment[known], reference[known]
+        return correlation_of(moving, lacking, frame.rate_hz, segment, options.confidence, truth)
     unknown = np.full((len(gyros), len(gyros)), math.nan)
     return Correlation(unknown, unknown, unknown, unknown)
 

@@ -20,15 +20,17 @@ from vgyro.metrics import (
     NoiseCoefficients,
     Sampling,
     allan_deviation,
-    correlation_matrix,
+    cleaned_of,
+    correlation_of,
     noise_coefficients,
     noise_from_differences,
+    own_samples,
     read_curve,
     without_outliers,
 )
 from vgyro.storage.tables import write_json
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.rates_file import ArrayFile, FileColumns, has_moved, read_array
+from vgyro.tasks.rates_file import ArrayFile, FileColumns, has_moved, incomplete, read_frame
 
 ENOUGH_REST_S = 10.0
 LONG_ENOUGH = 30  # samples
@@ -57,18 +59,23 @@ def main(task: Task) -> None:
     engine = task.options["analysis"].get("engine", "native")
     gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
     path = source_of(task.inputs["rates"])
-    frame = read_array(path, [], task.options["axis"])
+    frame = read_frame(path, gyros, task.options["axis"])
     places = [(path, gyro) for gyro in gyros]
     sampling = frame.rest_sampling(options.most_lost_s)
     found = None
     if rests_enough(sampling):
         try:
-            found = noise_at_rest(FileColumns(places, frame.at_rest), sampling, options, engine)
+            lacking = [gyros.index(gyro) for gyro in incomplete(path, gyros)]
+            found = noise_at_rest(FileColumns(places, frame.at_rest), sampling, options, engine, lacking)
         except TooShort as reason:
             logging.warning("not from the samples at rest: %s", reason)
     if found is None:
         found = noise_in_motion(FileColumns(places), frame, engine)
     write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
+
+
+_UNKNOWN = Coefficient(math.nan, math.nan, math.nan)
+NOTHING_KNOWN = NoiseCoefficients(_UNKNOWN, _UNKNOWN, _UNKNOWN, math.nan, math.nan)
 
 
 def source_of(choices: Sequence[Path]) -> Path:
@@ -82,24 +89,39 @@ def rests_enough(sampling: Sampling) -> bool:
     return len(sampling) >= ENOUGH_REST_S * sampling.rate_hz and longest >= LONG_ENOUGH
 
 
-def noise_at_rest(gyros: FileColumns, sampling: Sampling, options: MetricsOptions, engine: str) -> ArrayNoiseRecord:
-    """From the samples at rest, the only ones of `gyros`, without outliers; averages go over short losses alone."""
+def noise_at_rest(
+    gyros: FileColumns, sampling: Sampling, options: MetricsOptions, engine: str, lacking: Sequence[int] = ()
+) -> ArrayNoiseRecord:
+    """From the samples at rest, the only ones of `gyros`, without outliers; averages go over short losses alone.
+
+    lacking : places of gyros that have no value in some samples: these are lost to them alone
+    """
     segment, rate_hz = sampling.segment, sampling.rate_hz
     fits, read = [], []
-    for rate in gyros:
-        outliers = without_outliers(rate, rate_hz, segment, options.outlier_threshold)[1]
-        curve = allan_deviation(
-            rate[~outliers], rate_hz, None, None, options.confidence, engine, options.taus_per_octave,
-            sampling=sampling.without(outliers),
-        )  # fmt: skip
+    for place, rate in enumerate(gyros):
+        own, when = own_samples(rate, sampling) if place in lacking else (rate, sampling)
+        cut = segment if when is sampling else when.segment
+        outliers = without_outliers(own, when.rate_hz, cut, options.outlier_threshold)[1]
+        try:
+            curve = allan_deviation(
+                own[~outliers], when.rate_hz, None, None, options.confidence, engine, options.taus_per_octave,
+                sampling=when.without(outliers),
+            )  # fmt: skip
+        except TooShort as reason:
+            if place not in lacking:
+                raise
+            logging.warning("gyro %d has too few values for its noise: %s", place + 1, reason)
+            fits.append(NOTHING_KNOWN)
+            read.append(math.nan)
+            continue
         fits.append(noise_coefficients(curve, replicates=options.bootstrap, seed=options.seed))
         read.append(read_curve(curve, 1.0)[0])
 
     def cleaned(rate: np.ndarray) -> np.ndarray:
-        return without_outliers(rate, rate_hz, segment, options.outlier_threshold)[0]
+        return cleaned_of(rate, rate_hz, segment, options.outlier_threshold)
 
     columns = replace(gyros, cleaned=cleaned)
-    correlation = correlation_matrix(columns, rate_hz, sampling.stretch, options.confidence).value
+    correlation = correlation_of(columns, lacking, rate_hz, sampling.stretch, options.confidence).value
     return ArrayNoiseRecord("samples at rest", len(segment) / rate_hz, fits, read, correlation)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import overload
 
@@ -13,8 +13,10 @@ import pyarrow.parquet as pq
 
 from vgyro.board import Board
 from vgyro.errors import DataError
+from vgyro.fusion.missing import fill_missing
 from vgyro.metrics.sampling import Sampling
 from vgyro.storage.tables import read_batches, read_column, read_metadata
+from vgyro.tasks.block_means import between
 
 DEVIATION = "sd_{}"
 """Column of fused.parquet with the posterior standard deviation of another one."""
@@ -24,7 +26,10 @@ DEVIATION = "sd_{}"
 class ArrayFile:
     """One array of one recording.
 
-    rate [T, N] deg/s, as stored (float32 or float64), each column contiguous; segment [T] int32; at_rest [T] bool.
+    rate [T, N] deg/s, as stored (float32 or float64), each column contiguous; segment [T] int32; at_rest [T] bool,
+    false also in the rows in which no gyro of the array has a value: they are lost.
+    missing [T, N] bool : where a gyro has no value, and `rate` holds what fill_missing made from the other gyros; None
+    where nothing is missing. Figures of a gyro leave these samples out.
     Other columns are read from `path` each time they are asked for, so that a long recording need not hold them.
     axis : of the array; the reference counts only if it is about this axis
     """
@@ -35,6 +40,7 @@ class ArrayFile:
     rate_hz: float
     path: Path
     axis: str
+    missing: np.ndarray | None = None
 
     @property
     def moved(self) -> bool:
@@ -76,8 +82,32 @@ def has_moved(path: Path) -> bool:
     return "moved" in read_metadata(path)
 
 
+def lost_rows(path: Path, gyros: Sequence[str], axis: str) -> np.ndarray | None:
+    """bool [T]: the rows in which none of the axis' gyros has a value; None where convert found none."""
+    if not read_metadata(path).get("lost_rows", {}).get(axis):
+        return None
+    parts = [np.logical_and.reduce([np.isnan(batch[gyro]) for gyro in gyros])
+             for batch in read_batches(path, list(gyros))]  # fmt: skip
+    return np.concatenate(parts)
+
+
+def incomplete(path: Path, gyros: Sequence[str]) -> list[str]:
+    """The gyros that lack values in some samples, as convert counted them."""
+    missing = read_metadata(path).get("missing", {})
+    return [gyro for gyro in gyros if missing.get(gyro)]
+
+
+def read_frame(path: Path, gyros: Sequence[str], axis: str) -> ArrayFile:
+    """The file without rates of gyros; its lost rows are not at rest.  gyros : of the axis"""
+    frame, lost = read_array(path, [], axis), lost_rows(path, gyros, axis)
+    return frame if lost is None else replace(frame, at_rest=frame.at_rest & ~lost)
+
+
 def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
-    """Columns of `gyros` from rates.parquet.  raises : DataError if the sample rate is not known"""
+    """Columns of `gyros`, all those of one axis, from rates.parquet; what they lack is filled in, see ArrayFile.
+
+    raises : DataError if the sample rate is not known
+    """
     metadata = read_metadata(path)
     if metadata.get("rate_hz") is None:
         raise DataError("rates without a sample rate", str(path), "run the stage `convert` again")
@@ -93,7 +123,11 @@ def read_array(path: Path, gyros: list[str], axis: str) -> ArrayFile:
         for column, gyro in zip(rate, gyros, strict=True):
             column[rows] = batch[gyro]
         first = rows.stop
-    return ArrayFile(rate.T, segment, at_rest, float(metadata["rate_hz"]), path, axis)
+    rate_hz = float(metadata["rate_hz"])
+    missing = fill_missing(rate.T, rate_hz)
+    if missing is not None:
+        at_rest &= ~missing.all(axis=1)
+    return ArrayFile(rate.T, segment, at_rest, rate_hz, path, axis, missing)
 
 
 def thermometers(board: Board, gyros: list[str]) -> list[str]:
@@ -103,7 +137,10 @@ def thermometers(board: Board, gyros: list[str]) -> list[str]:
 
 
 def read_temperature(file: ArrayFile, columns: list[str]) -> np.ndarray | None:
-    """Mean of some temperatures [T], °C, in single precision; None where there is none."""
+    """Mean of some temperatures [T], °C, in single precision; None where there is none.
+
+    Between the values of a thermometer slower than the gyros: on straight lines, and held at the ends.
+    """
     columns = [name for name in columns if name in pq.read_schema(file.path).names]
     if not columns:
         return None
@@ -112,7 +149,19 @@ def read_temperature(file: ArrayFile, columns: list[str]) -> np.ndarray | None:
         rows = slice(first, first + len(batch[columns[0]]))
         mean[rows] = sum(batch[name] for name in columns) / len(columns)
         first = rows.stop
-    return mean
+    if not np.isnan(mean).any():
+        return mean
+    return _interpolated(file, columns)
+
+
+def _interpolated(file: ArrayFile, columns: list[str]) -> np.ndarray | None:
+    """Mean of temperatures that lack values, each interpolated in time; None if none has any."""
+    time, total, count = file.time, np.zeros(len(file.segment)), 0
+    for name in columns:
+        values = between(time, read_column(file.path, name, float))
+        if np.isfinite(values).all():
+            total, count = total + values, count + 1
+    return (total / count).astype(np.float32) if count else None
 
 
 def stretch_times(file: ArrayFile) -> np.ndarray:
@@ -145,12 +194,14 @@ class FileColumns(Sequence[np.ndarray]):
 
     places  : file and name of each;  where : [T] samples to take, None: all
     less    : taken off, a number or an array [those samples];  cleaned : what is done to each then, None: nothing
+    held    : file and name → the column [T], which is not read then
     """
 
     places: Sequence[tuple[Path, str]]
     where: np.ndarray | None = None
     less: float | np.ndarray = 0.0
     cleaned: Callable[[np.ndarray], np.ndarray] | None = None
+    held: Mapping[tuple[Path, str], np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.places)
@@ -162,7 +213,8 @@ class FileColumns(Sequence[np.ndarray]):
     def __getitem__(self, index: int | slice) -> np.ndarray | FileColumns:
         if isinstance(index, slice):
             return replace(self, places=self.places[index])
-        values = read_column(*self.places[index], float)
+        place = self.places[index]
+        values = self.held[place].copy() if place in self.held else read_column(*place, float)
         if self.where is not None and not self.where.all():
             values = values[self.where]
         if np.any(self.less):

@@ -9,6 +9,7 @@ import numpy as np
 from vgyro.report.envelope import Envelope, places_of, stretches
 from vgyro.report.model import RatesPart
 from vgyro.storage.tables import read_columns, read_metadata, row_groups
+from vgyro.tasks.block_means import between
 
 REFERENCE = "reference"
 TEMPERATURE = "temp_"
@@ -38,7 +39,7 @@ def read_rates(path: Path, gyros: list[str]) -> RatesPart:
             still = at_rest[done : done + len(time)]
             rest.feed(time, {name: np.where(still, batch[name], np.nan) for name in gyros})
         borders.feed(batch)
-        slow.feed(batch)
+        slow.feed({**batch, **{name: between(time, batch[name]) for name in temperatures}})
         done += len(time)
     time, curves = whole.result()
     drawn = curves.pop(REFERENCE, None)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from vgyro.board import Board
 from vgyro.config import VolatilityOptions
@@ -36,13 +37,15 @@ def main(task: Task) -> None:
     # What is declared to be at rest is no motion to analyse where nothing of it is.
     whole = task.options.get("kind") in IN_MOTION or (share == 0 and not has_moved(path))
     runs = find_runs(path, float(rate_hz), length, whole)
-    found = stretches_of(blocks_of(path, runs, []))
+    present = present_of(path, gyros)
+    # Where no gyro has a value there is no block: that shows only with the gyros.
+    found = stretches_of(blocks_of(path, runs, gyros if present else [], present))
     use = "in motion, all of it used" if whole else f"{share:.1%} of the recording at rest and used"
     samples = found[-1][1] if found else 0
     logging.info("%d samples at %g Hz in %d stretches, %s", samples, float(rate_hz) / length, len(found), use)
     extra = {"rate_hz": float(rate_hz) / length, "runs": found, "use": use}
     with TableWriter(task.output("series"), "series", task.provenance(), extra) as writer:
-        rows = RowStream(table_of(blocks, gyros) for blocks in blocks_of(path, runs, gyros))
+        rows = RowStream(table_of(blocks, gyros) for blocks in blocks_of(path, runs, gyros, present))
         while (table := rows.take(ROW_GROUP)).num_rows or not writer.begun:
             writer.append(table)
 
@@ -62,9 +65,16 @@ def find_runs(path: Path, rate_hz: float, length: int, whole: bool) -> Runs:
     return finder.runs()
 
 
-def blocks_of(path: Path, runs: Runs, gyros: list[str]) -> Iterator[Blocks]:
-    """The blocks of some gyros, or of none: where they are is known without them."""
-    means = BlockMeans(runs)
+def present_of(path: Path, gyros: list[str]) -> dict[int, float]:
+    """Place of each gyro that lacks values → share of the samples in which it has one; it is NaN in the others."""
+    missing = read_metadata(path).get("missing", {})
+    samples = pq.read_metadata(path).num_rows
+    return {place: 1 - missing[gyro] / samples for place, gyro in enumerate(gyros) if missing.get(gyro)}
+
+
+def blocks_of(path: Path, runs: Runs, gyros: list[str], present: Mapping[int, float]) -> Iterator[Blocks]:
+    """The blocks of some gyros, or of none: where they are is known without them.  present : as BlockMeans takes it"""
+    means = BlockMeans(runs, present if gyros else None)
     for piece in read_batches(path, ["time", "segment", *gyros]):
         yield means.add([piece[gyro] for gyro in gyros], piece["time"], piece["segment"])
     if (last := means.rest()) is not None:

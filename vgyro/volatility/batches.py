@@ -19,7 +19,7 @@ def window_batch(
 ) -> np.ndarray:
     """r_t of K windows and of `ahead` samples after each: window_residuals, window by window.
 
-    values  : [m, N] deg/s, samples of the series
+    values  : [m, N] deg/s, samples of the series; NaN where a gyro has no value, and so is r_t then
     starts  : [K] first sample of each window in `values`;  length : of each window
     ahead   : samples after each window; beyond the end of `values` the last sample is repeated
     span    : samples of the first-pass rate estimate of `residual`
@@ -40,9 +40,16 @@ def window_batch(
         r[:, 0] = block[:, 0] - np.where(known[:, None], values[np.maximum(starts - 1, 0)], np.nan)
         return r
     low, high = span_about(total, length, span // 2)
-    median = _cut(np.median(values, axis=1), starts, total)
+    median = _cut(median_of_gyros(values), starts, total)
     sums = np.concatenate([np.zeros((len(starts), 1)), np.cumsum(median, axis=1)], axis=1)
     return block - ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
+
+
+def median_of_gyros(values: np.ndarray) -> np.ndarray:
+    """Median [m] over the gyros [m, N] that have a value; in no row all of them lack one."""
+    if not np.isnan(values).any():
+        return np.median(values, axis=1)
+    return np.nanmedian(values, axis=1)
 
 
 def fitted_batch(

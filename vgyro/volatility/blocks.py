@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,10 +104,16 @@ class Blocks:
 
 
 class BlockMeans:
-    """Makes the blocks: `add` the samples piece by piece, in order, and take the blocks that are complete."""
+    """Makes the blocks: `add` the samples piece by piece, in order, and take the blocks that are complete.
 
-    def __init__(self, runs: Runs) -> None:
+    present : gyro → share of its samples that have a value, of the gyros that lack some (NaN). A block is the mean of
+              the values that are there; with less than half as many as usual for that gyro it is NaN. Blocks in which
+              no gyro has enough are left out.
+    """
+
+    def __init__(self, runs: Runs, present: Mapping[int, float] | None = None) -> None:
         self._runs, self._count = runs, 0
+        self._present = dict(present or {})
         slots = runs.slots(runs.stop - 1) - runs.slots(runs.start) + 1
         # A run's last block is complete when the run reaches its last slot.
         self._complete = slots // runs.length
@@ -126,11 +132,37 @@ class BlockMeans:
         slot = self._runs.slots(sample) - self._runs.slots(self._runs.start)[run]
         block = slot // self._runs.length + self._first[run]
         if self._runs.length == 1:
-            return self._numbered(block, _columns(rate, len(time)), time, segment)
+            values = _columns(rate, len(time))
+            if self._present:
+                some = np.isfinite(values).any(axis=1)
+                block, values, time, segment = block[some], values[some], time[some], segment[some]
+            return self._numbered(block, values, time, segment)
+        if self._present:
+            rate = self._with_counts(rate)
         first = np.flatnonzero(np.diff(block, prepend=-1))
         count = np.diff(first, append=len(block))
         sums = _columns([np.add.reduceat(one, first, dtype=float) if len(first) else one for one in rate], len(first))
         return self._whole(block[first], run[first], count, sums, time[first], segment[first])
+
+    def _with_counts(self, rate: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """The gyros, zero where one has no value, and behind them 1 or 0 for each that lacks some: has it one?"""
+        there = [np.isfinite(rate[gyro]) for gyro in self._present]
+        filled = list(rate)
+        for gyro, mask in zip(self._present, there, strict=True):
+            filled[gyro] = np.where(mask, rate[gyro], 0.0)
+        return [*filled, *there]
+
+    def _means(self, sums: np.ndarray, count: np.ndarray) -> np.ndarray:
+        """Means [b, N] of blocks with `count` [b] samples; NaN where a gyro has too few values."""
+        if not self._present:
+            return sums / count[:, None]
+        gyros = sums.shape[1] - len(self._present)
+        means = sums[:, :gyros] / count[:, None]
+        for place, (gyro, share) in enumerate(self._present.items(), gyros):
+            own = sums[:, place]
+            enough = (own > 0) & (2 * own >= share * count)
+            means[:, gyro] = np.divide(sums[:, gyro], own, out=np.full(len(own), np.nan), where=enough)
+        return means
 
     def rest(self) -> Blocks | None:
         """What the last block gives, after all samples; None if none was begun."""
@@ -178,7 +210,12 @@ class BlockMeans:
     ) -> Blocks:
         """The blocks that are complete and of which at least half of the samples are there."""
         good = (2 * count >= self._runs.length) & (block - self._first[run] < self._complete[run])
-        return self._numbered(block[good], sums[good] / count[good, None], time[good], segment[good])
+        values = self._means(sums[good], count[good])
+        block, time, segment = block[good], time[good], segment[good]
+        if self._present:
+            some = np.isfinite(values).any(axis=1)
+            block, values, time, segment = block[some], values[some], time[some], segment[some]
+        return self._numbered(block, values, time, segment)
 
     def _numbered(self, block: np.ndarray, values: np.ndarray, time: np.ndarray, segment: np.ndarray) -> Blocks:
         """Number the stretches: a block that is left out, and the end of a run, begin a new one."""

@@ -134,7 +134,7 @@ class Evidence:
 def gather_evidence(
     series: np.ndarray, sampled: Sampled, span: int, lags: int, tones: Sequence[RateTone], garch: Garch | None
 ) -> Evidence | None:
-    """Test one series [T] deg/s of one stretch; None if it does not vary or has less than 50 samples.
+    """Test one series [T] deg/s of one stretch; None if it does not vary, lacks values, or has less than 50.
 
     span : samples of the running mean and median;  lags : of ARCH-LM;  tones : of the rate;  garch : its model, or None
 
@@ -155,6 +155,8 @@ def gather_evidence(
     ρ = cov(d²_t, d²_{t+1})/(var(d²) + 4 mean(d²) s² + (κ - 1) s⁴), and ARCH-LM is about T·ρ² [derived].
     """
     series = np.asarray(series, dtype=float)
+    if not np.isfinite(series).all():
+        return None
     parts = whiten(series, sampled.rate_hz, span)
     if len(series) < max(FEWEST_SAMPLES, 2 * LONG_LAGS + 2, 2 * lags + 2) or not np.isfinite(parts.residual).all():
         return None

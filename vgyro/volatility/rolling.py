@@ -79,7 +79,8 @@ def weights_of_windows(
 ) -> dict[Mode, WindowWeights]:
     """Weights of the samples that belong to a chunk of consecutive windows, `step` apart.
 
-    values : [m, N] deg/s, samples offset..offset+m-1 of the series, which hold `rows_needed`
+    values : [m, N] deg/s, samples offset..offset+m-1 of the series, which hold `rows_needed`; NaN where a gyro has no
+             value: in a window with one it has no model, and no weight
     models : of the chunk's windows; none only where the whole series holds no window
     runs   : all stretches of the series, in order
     span   : of the definition `residual`
@@ -213,7 +214,12 @@ def _residuals(
     first = max(int(part.start[0]) - 1 - offset, 0)
     rows = values[first : int(part.start[-1]) + part.length + ahead - offset]
     from_here = offset + first
-    return window_batch(rows, part.start - from_here, part.length, ahead, definition, span, run_start - from_here)
+    r = window_batch(rows, part.start - from_here, part.length, ahead, definition, span, run_start - from_here)
+    if not np.isnan(rows).any():
+        return r
+    # A gyro with a model may lack values after its window: there its variance goes on without a shock.
+    ahead_of = np.nan_to_num(r[:, part.length :], nan=0.0)
+    return np.concatenate([r[:, : part.length], ahead_of], axis=1)
 
 
 def _weigh(

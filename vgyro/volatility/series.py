@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.config import Definition
-from vgyro.volatility.batches import span_about
+from vgyro.volatility.batches import median_of_gyros, span_about
 from vgyro.volatility.blocks import PIECE, BlockMeans, RunFinder, block_length
 from vgyro.volatility.stretches import Window
 
@@ -79,7 +79,7 @@ def window_residuals(
 ) -> np.ndarray:
     """r_t of the samples of one window and of `ahead` samples after it.
 
-    values  : [M, N] deg/s, the series
+    values  : [M, N] deg/s, the series; NaN where a gyro has no value, and so is r_t then
     window  : start and stop in it
     span    : samples of the first-pass rate estimate of `residual`
     ahead   : samples after the window, within its segment, over which its model is carried forward
@@ -104,7 +104,7 @@ def window_residuals(
         known = before >= (window.start if segment_start is None else segment_start)
         first = values[before : before + 1] if known else np.full((1, block.shape[1]), np.nan)
         return np.diff(block, axis=0, prepend=first)
-    return block - _running_mean(np.median(block, axis=1)[:, None], window.length, span // 2)
+    return block - _running_mean(median_of_gyros(block)[:, None], window.length, span // 2)
 
 
 def detrended(r: np.ndarray, span: int) -> np.ndarray:

@@ -58,7 +58,7 @@ def explain_array(
     span    : samples of the running mean and median;  lags : of ARCH-LM
     tones   : gyro → lines of its rate;  garch : gyro → its GARCH(1,1) of the level
     returns : one Effect a gyro. The verdict is `nothing`, or any of heteroskedastic, drift, tone at … Hz, disturbance
-              at t = … s, joined by +, or correlation; or why there is none: no variance, too short.
+              at t = … s, joined by +, or correlation; or why there is none: no variance, values missing, too short.
 
     Power, T = 3600 (400 simulated series each): GARCH(1,1) is missed in less than 1 % of series at (α, β) = (.1, .8),
     (.05, .9), (.2, .75), (.1, .3); in 14 % at (.02, .97), 24 % at (.03, .9), 29 % at (.05, .5). White noise is called
@@ -106,6 +106,9 @@ def _effect(
 def _no_verdict(gyro: str, series: np.ndarray) -> Effect:
     if len(series) >= FEWEST_SAMPLES and np.isfinite(series).all():
         return Effect(gyro, "no variance", "No verdict: the gyro's output does not vary.")
+    if not np.isfinite(series).all():
+        lacks = int((~np.isfinite(series)).sum())
+        return Effect(gyro, "values missing", f"No verdict: {lacks} of {len(series)} samples have no value.")
     why = f"too short: {len(series)} samples"
     return Effect(gyro, why, f"No verdict: {len(series)} samples without a gap are too few.")
 

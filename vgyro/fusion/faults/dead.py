@@ -18,6 +18,8 @@ USUAL_SHARE = 0.75
 SAME = 1e-3
 """Two samples are one value if they differ by less than this share of the usual difference: a compensation of the
 temperature turns a repeated count into rates that creep."""
+SLOW, FEWEST_RUNS = 0.5, 10
+"""Runs of missing samples a value there, and at all, from which a gyro counts as one at a lower rate."""
 PIECE = 1 << 18
 MOST_SAMPLED = 200_000
 NEAR = 6.0  # s.d. of a sample
@@ -26,6 +28,7 @@ NEAR = 6.0  # s.d. of a sample
 def find_dead(array: ArrayRates, zero: np.ndarray | None = None) -> list[FaultEvent]:
     """Stretches in which a gyro repeats one value, longer than it does by chance, or has none.
 
+    Values that are missing, and were filled in (array.missing), are a dropout where they are for a second or more.
     zero : [N, 2] deg/s, between which the rate of a count of zero lies, NaN where not known
     A run is judged against this channel's own: the chance of equal neighbours, and its usual run, since few levels make
     equal counts normal. It is a dropout where its value is that of zero counts, or far from what the gyro gave before.
@@ -36,7 +39,10 @@ def find_dead(array: ArrayRates, zero: np.ndarray | None = None) -> list[FaultEv
         runs = _runs(column, array.segment, _usual_difference(column))
         level = (math.nan, math.nan) if zero is None else (float(zero[gyro, 0]), float(zero[gyro, 1]))
         found += [_event(array, gyro, start, stop, level) for start, stop in _too_long(runs, array)]
-        found += [_empty(gyro, start, stop) for start, stop in _missing(column)]
+        if array.missing is None:
+            found += [_empty(gyro, start, stop) for start, stop in _missing(column)]
+        else:
+            found += [_empty(gyro, start, stop) for start, stop in _long_gone(array.missing[:, gyro], array.rate_hz)]
     return sorted(found, key=lambda event: (event.start, event.gyro))
 
 
@@ -129,10 +135,29 @@ def _missing(column: np.ndarray) -> Iterator[tuple[int, int]]:
     """Runs of samples without a number."""
     for first in range(0, len(column), PIECE):
         if np.isnan(column[first : first + PIECE]).any():
-            gone = np.isnan(column)
-            borders = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]]).astype(np.int8)))
-            yield from ((int(start), int(stop)) for start, stop in borders.reshape(-1, 2))
+            yield from ((int(start), int(stop)) for start, stop in _marked(np.isnan(column)))
             return
+
+
+def _long_gone(gone: np.ndarray, rate_hz: float) -> Iterator[tuple[int, int]]:
+    """Runs of missing samples, each a second or more and longer than a slow gyro's values usually lie apart.
+
+    gone : [T] where one gyro has no value, and was filled in.  Shorter ones are filled in well enough.
+    """
+    runs = _marked(gone)
+    if not len(runs):
+        return
+    lengths = runs[:, 1] - runs[:, 0]
+    # Of a gyro at a lower rate than the others most values stand alone between two runs.
+    slow = len(runs) >= max(FEWEST_RUNS, SLOW * (len(gone) - lengths.sum()))
+    usual = TIMES_USUAL * float(np.median(lengths)) if slow else 0.0
+    for start, stop in runs[lengths >= max(SHORTEST_S * rate_hz, usual)]:
+        yield int(start), int(stop)
+
+
+def _marked(mask: np.ndarray) -> np.ndarray:
+    """First place, and one past the last, of each run of what is marked [M, 2]."""
+    return np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))).reshape(-1, 2)
 
 
 def _empty(gyro: int, start: int, stop: int) -> FaultEvent:
