@@ -52,7 +52,7 @@ def calibration_run(name: str = "calibration", reference: dict | None = None) ->
 
 def write_frames(folder: Path, columns: dict[str, np.ndarray], status: str = "good") -> Path:
     write_table(folder / "frames.parquet", columns, "frames", NOWHERE)
-    write_json(folder / "integrity.json", {"status": status})
+    write_json(folder / "integrity.json", {"status": status, "rate_hz": RATE_HZ})
     return folder / "frames.parquet"
 
 
@@ -80,7 +80,12 @@ def uncalibrated(folder: Path, board: Board, record: Manifest) -> dict:
 def run_convert(
     folder: Path, board: Board, record: Manifest, name: str, frames: Path, logs: list[Path] | None = None
 ) -> dict[str, np.ndarray]:
-    inputs = {"frames": [frames], "calibration": [folder / "calibration.json"], "reference": logs or []}
+    inputs = {
+        "frames": [frames],
+        "integrity": [frames.with_name("integrity.json")],
+        "calibration": [folder / "calibration.json"],
+        "reference": logs or [],
+    }
     options = {"manifest": record.model_dump(mode="json"), "board": board.model_dump(mode="json"), "recording": name}
     task = Task(inputs, {"rates": folder / f"{name}.parquet"}, {**options, "analysis": {"rest": {}}}, "")
     convert.main(task)
@@ -234,14 +239,13 @@ def test_a_log_of_rates_is_not_calibrated(tmp_path: Path, board: Board):
         assert np.all(rates[gyro.name] == gyro.sign * 1.25)
 
 
-def test_time_stamps_may_contradict_the_declared_rate(tmp_path: Path, board: Board):
+def test_the_rate_is_that_of_the_integrity_record(tmp_path: Path, board: Board):
     record = manifest({"name": "static", "kind": "static", "files": "x.bin"})
     uncalibrated(tmp_path, board, record)
-    for factor, expected in ((1.0, RATE_HZ), (1.01, RATE_HZ), (2.0, RATE_HZ / 2)):
-        columns = counts_of(board, np.zeros(1000))
-        columns["time"] = columns["time"] * factor + np.where(np.arange(1000) < 500, 0, 60)
-        run_convert(tmp_path, board, record, "static", write_frames(tmp_path / "frames", columns))
-        assert read_metadata(tmp_path / "static.parquet")["rate_hz"] == pytest.approx(expected, rel=1e-9)
+    frames = write_frames(tmp_path / "frames", counts_of(board, np.zeros(1000)))
+    write_json(tmp_path / "frames" / "integrity.json", {"status": "good", "rate_hz": 99.3})
+    run_convert(tmp_path, board, record, "static", frames)
+    assert read_metadata(tmp_path / "static.parquet")["rate_hz"] == 99.3
 
 
 def test_empty_frames(tmp_path: Path, board: Board):

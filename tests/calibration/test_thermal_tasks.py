@@ -47,7 +47,7 @@ class Lab:
             narrow = {name: values.astype(np.int16) for name, values in simulated.counts.items()}
             columns = {"time": simulated.time, "segment": segment, **narrow}
             write_table(folder / recording.name / "frames.parquet", columns, "frames", NOWHERE)
-            write_json(folder / recording.name / "integrity.json", {"status": "good"})
+            write_json(folder / recording.name / "integrity.json", {"status": "good", "rate_hz": self.board.rate_hz})
 
     def calibrate(self, name: str = "calibration.json", drop: tuple[str, ...] = (), **options: str) -> dict:
         """calibration.json from all recordings but some."""
@@ -68,6 +68,7 @@ class Lab:
         """Rates of a recording, and their metadata."""
         inputs = {
             "frames": [self.folder / recording / "frames.parquet"],
+            "integrity": [self.folder / recording / "integrity.json"],
             "calibration": [self.folder / calibration],
         }
         given = {
@@ -183,7 +184,11 @@ def test_rows_in_pieces_give_the_same_rates(lab: Lab, tmp_path: Path) -> None:
     frames = read_columns(lab.folder / "static" / "frames.parquet")
     with TableWriter(lab.folder / "pieces" / "frames.parquet", "frames", NOWHERE, row_group=1777) as writer:
         writer.append(frames)
-    inputs = {"frames": [lab.folder / "pieces" / "frames.parquet"], "calibration": [lab.folder / "calibration.json"]}
+    inputs = {
+        "frames": [lab.folder / "pieces" / "frames.parquet"],
+        "integrity": [lab.folder / "static" / "integrity.json"],
+        "calibration": [lab.folder / "calibration.json"],
+    }
     given = {
         "manifest": lab.manifest.model_dump(mode="json"), "board": lab.board.model_dump(mode="json"),
         "recording": "static", "analysis": {"rest": {}},

@@ -63,11 +63,13 @@ class Chain:
         columns |= {} if celsius is None else {"t": celsius.astype(np.float32)}
         write_table(self.folder / "frames.parquet", columns, "frames", Provenance({}, "", ""))
         row = {"source": "nominal", "scale": 1.0, "bias": 0.0, "temperature": None}
+        write_json(self.folder / "integrity.json", {"rate_hz": RATE_HZ})
         write_json(self.folder / "calibration.json", {"gyros": dict.fromkeys(self.gyros, row)})
 
     def all(self) -> None:
         """Everything from frames.parquet on."""
-        self.run(convert, {"frames": "frames.parquet", "calibration": "calibration.json", "reference": []}, ("rates",))
+        inputs = {"frames": "frames.parquet", "integrity": "integrity.json", "calibration": "calibration.json"}
+        self.run(convert, {**inputs, "reference": []}, ("rates",))
         self.run(noise, {"rates": "rates.parquet"}, ("noise.json",))
         weights = self.weights() if self.volatility else {"weights": [], "moved": []}
         self.run(faults, {"rates": "rates.parquet", "calibration": "calibration.json"}, ("faults",))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -187,7 +188,7 @@ def _table(
     """A rate-table recording: are the plateaus where they are said to be, and the rates in deg/s?"""
     log = reference_file(manifest, recording.name, folder) if isinstance(recording.reference, FileReference) else None
     try:
-        plateaus = list(plateaus_of(Source(recording, folder, log), CalibrationOptions()))
+        plateaus = list(plateaus_of(Source(recording, folder, math.nan, log), CalibrationOptions()))
     except VgyroError as error:
         yield Finding(f"{key}.reference", Suspicion(str(error), True))
         return

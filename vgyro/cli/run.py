@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     if (code := _check(manifest, options)) != 0:
         return code
     page = Path("reports") / f"{name}.html"
-    command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), "--config", f"only={name}", "--", "one"]
+    command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), "--config", f"only={name}", "--quiet", "rules", "host", "--", "one"]
     ended = subprocess.run(command, check=False)
     if ended.returncode != 0:
         return 1

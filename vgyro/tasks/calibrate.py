@@ -90,12 +90,13 @@ def usable(task: Task, manifest: Manifest) -> tuple[list[Source], dict[str, str]
         log = None
         if recording.kind == "calibration" and isinstance(recording.reference, FileReference):
             log = next(logs, None)
-        if read_json(integrity)["status"] == "refused":
+        about = read_json(integrity)
+        if about["status"] == "refused":
             reason = "refused: see its integrity record"
         elif values_of(manifest, recording) == "rates":
             reason = "holds rates, not counts: nothing to calibrate"
         else:
-            sources.append(Source(recording, frames, log))
+            sources.append(Source(recording, frames, float(about["rate_hz"]), log))
             continue
         if recording.kind == "calibration":
             skipped[recording.name] = reason

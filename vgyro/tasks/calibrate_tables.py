@@ -30,10 +30,11 @@ from vgyro.tasks.reference_log import read_reference
 
 @dataclass(frozen=True)
 class Source:
-    """A recording that the calibration may use, its frames, and its logged reference if it has one."""
+    """A recording that the calibration may use, its frames, its sample rate, its logged reference if it has one."""
 
     recording: Recording
     frames: Path
+    rate_hz: float
     reference: Path | None = None
 
 

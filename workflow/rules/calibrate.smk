@@ -26,6 +26,7 @@ rule convert:
     """Counts to deg/s, with the stretches at rest and the true rate where it is known."""
     input:
         frames="results/{dataset}/{recording}/frames.parquet",
+        integrity="results/{dataset}/{recording}/integrity.json",
         calibration="results/{dataset}/calibration.json",
         reference=reference_file,
     output:
@@ -41,7 +42,8 @@ rule convert:
         options=stage("manifest", "board", "rest"),
         code=code("convert"),
     shell:
-        "python -m vgyro.tasks.convert --input frames {input.frames} --input calibration {input.calibration}"
+        "python -m vgyro.tasks.convert --input frames {input.frames} --input integrity {input.integrity}"
+        " --input calibration {input.calibration}"
         " --input reference {input.reference:q} --output rates {output.rates}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
