@@ -135,10 +135,10 @@ def test_a_plateau_that_varies_five_times_as_much_is_unsteady(factor, seen):
 
 
 def test_what_lies_after_the_end():
-    assert outside_recording("plateau", [(0, 10), (50, 60)], 60.0) == []
-    ((number, cut),) = outside_recording("plateau", [(0, 10), (50, 60.1)], 60.0)
+    assert outside_recording("plateau", [(0, 10), (50, 60.5)], 60.0) == []
+    ((number, cut),) = outside_recording("plateau", [(0, 10), (50, 60.6)], 60.0)
     assert (number, cut.sure) == (1, False)
-    assert cut.message == "the plateau from 50 to 60.1 s goes on beyond the end of the recording, at 60 s"
+    assert cut.message == "the plateau from 50 to 60.6 s goes on beyond the end of the recording, at 60 s"
     ((_, late),) = outside_recording("rest", [(60, 70)], 60.0)
     assert late.sure
     assert late.message.startswith("the rest from 60 to 70 s lies after the end of the recording, at 60 s")

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from storage_frames import dsp6_text_line
 
 from vgyro.board import Board
@@ -288,3 +290,23 @@ def test_other_lines_do_not_count_as_the_boards_share(dump):
     (found,) = sniff(dump(data), [text_board("$GYR")])
     assert found.frames == 100
     assert found.good_share < 0.2
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), chunk=st.integers(1, 2000), prefix=st.sampled_from(["", "$G"]))
+def test_the_size_of_the_chunks_changes_nothing(tmp_path_factory, seed, chunk, prefix):
+    rng = np.random.default_rng(seed)
+    head = f"{prefix}," if prefix else ""
+    kinds = [f"{head}{{}},{{}}\r\n", "A,{},{}\r\n", "# note {} {}\r\n", "\r\n", "1,2", "{}{}\r", "x" * 5000 + "\n"]
+    chosen = rng.choice(len(kinds), 120, p=[0.7, 0.1, 0.05, 0.05, 0.04, 0.04, 0.02])
+    text = "".join(kinds[kind].format(*rng.integers(-99, 99, 2)) for kind in chosen).encode()
+    path = tmp_path_factory.mktemp("chunks") / "x.csv"
+    path.write_bytes(text[int(rng.integers(6)) : len(text) - int(rng.integers(6))])
+    results = []
+    for size in (chunk, 1 << 22):
+        reader = DumpReader([path], text_board(prefix), 100, LENIENT, size)
+        results.append((gather(reader, text_board(prefix)), reader.integrity))
+    (one, first), (other, second) = results
+    assert first == second
+    assert np.array_equal(one.counts["a"], other.counts["a"])
+    assert np.array_equal(one.time, other.time)

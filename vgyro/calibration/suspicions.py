@@ -27,6 +27,7 @@ STEADY = 0.1  # … and leaves less than this of the spread of the whole recordi
 NEARLY_BEST = 1.2  # shifts whose spread is so near the least are as good; the middle one is taken
 UNSTEADY = 5.0  # a plateau that varies so many times more than the median one
 FEWEST_PLATEAUS = 3
+CUT_SHORT_S = 0.5  # a plateau that goes on so long beyond the end is cut short; less is rounding
 RATE_WARNING, RATE_MISTAKE = 0.02, 0.10
 
 
@@ -185,7 +186,7 @@ def outside_recording(what: str, spans: Sequence[Span], end_s: float) -> list[tu
         if start >= end_s:
             text = f"{where} lies after the end of the recording, at {end_s:.6g} s: check its times, and `rate_hz`"
             found.append((number, Suspicion(text, True)))
-        elif stop > end_s:
+        elif stop > end_s + CUT_SHORT_S:
             text = f"{where} goes on beyond the end of the recording, at {end_s:.6g} s"
             found.append((number, Suspicion(text, False)))
     return found

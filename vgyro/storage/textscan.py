@@ -65,6 +65,7 @@ class TextScanner:
             raise TypeError(f"board {self.board.name!r} sends binary frames")
         self._frame = frame
         self._pattern = re.compile(line_pattern(frame))
+        self._plain = re.compile(line_pattern(frame, blanks=False))
         self._separator = re.compile(separator_pattern(frame))
         self._kinds = Kinds(frame, self.forms)
         self._types = channel_types(frame)
@@ -115,7 +116,8 @@ class TextScanner:
 
     def _lines(self, text: bytes) -> tuple[list[bytes], np.ndarray, np.ndarray]:
         """Fields, start and stop of the lines of the right form and XOR."""
-        matches = [m for m in self._pattern.finditer(text) if m.end(1) - m.start(1) <= self._frame.max_length]
+        pattern = self._pattern if b" " in text or b"\t" in text else self._plain
+        matches = [m for m in pattern.finditer(text) if m.end(1) - m.start(1) <= self._frame.max_length]
         start = np.array([m.start() for m in matches], dtype=np.int64) + self._base
         stop = np.array([m.end() for m in matches], dtype=np.int64) + self._base
         texts = [m.group(1) for m in matches]
