@@ -14,10 +14,10 @@ from vgyro.storage.clocks.windows import (
     refined_period,
     robust_sd,
     rough_period,
-    without_long_steps,
 )
 
-FEW = 64  # rows; fewer tell little
+FEW = 64  # rows; fewer tell little …
+FEW_SPREAD = 0.28  # … but how far steps are from whole periods, r.m.s.
 STRICTLY_EVEN = 0.005  # s.d. of the steps, periods: too little to accumulate within a few hundred rows
 COHERENT = 0.25  # s.d. of the steps up to which their phase is told apart
 SMALL_JITTER = 0.2  # r.m.s., periods: stamps are sampling times
@@ -30,6 +30,7 @@ BEYOND_USUAL = 2.0  # … times the 99.9th percentile of the steps …
 FEW_STEPS = 1000  # … or, of fewer steps, times the former bound
 ROUNDED_STEPS = 0.3  # resolution, periods
 MIN_BEATS, BEAT_SPREAD = 8, 0.3  # regular odd steps: distances between them, and their s.d. over their mean
+ENVELOPE_ROWS = 256  # of the blocks whose minima tell the noise of the envelope
 HORIZON, LONGEST_HORIZON = 2048, 65_536  # rows over which an envelope is taken
 
 
@@ -70,8 +71,8 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
        R(m) = |mean exp(2πi (s[k+m]-s[k])/P)|, a grid has R(m) = R(1), a walk R(1)^m. The smallest m (a power of two up
        to 1024) with R(1)^m < 0.3 decides, at the geometric mean of both. Steps that spread by less than 0.005 P are
        even. Else, the variances: a walk if D(m) > 0.35 m D(1) at m = n/64, at least 8 and at most 1024; the outer
-       0.5 % of steps are cut off, and D(m) is taken from the quartiles. With fewer than 64 rows only the spread counts:
-       even below 0.28 P.
+       0.5 % of steps are cut off, and D(m) is taken from the quartiles. With fewer than 64 rows only the distance of
+       steps from whole periods counts: even below 0.28 P.
     2. On a grid: stamps that are off by up to 0.25 to 1.2 steps of their resolution, and that above 0.02 P, are
        rounded: sampled, time from the line through them. With less than 0.2 P r.m.s. of jitter, and less than 5 % of
        steps below half a period, they are sampled: time is the stamp. Else they are arrival times, never earlier than
@@ -79,6 +80,8 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     3. Off the grid: sampled unevenly, time is the stamp.
     Steps that are all the resolution or a multiple: samples are missing, unless the odd ones come regularly (nine or
     more, distances with a s.d. below 0.3 of their mean, chance gives 1): then the period is no whole number of ticks.
+    What this cannot tell: latency that wanders over more than m rows looks like a walk, and a lost sample at regular
+    distances like rounding, if the period is one tick.
 
     times      : float64 [n], s, wraps undone, repeats dropped
     resolution : s, as the steps show it; finest: s, taken instead if that is but the period
@@ -90,21 +93,23 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     period, lag = rough_period(times)
     if not (period > 0 and math.isfinite(1 / period)):
         return None
-    steps, beat = np.diff(times), None
+    steps, beat, on_tick = np.diff(times), None, False
     if 0.95 < period / resolution < 1.05:
         beat = _beat_period(steps, resolution)
-        period, resolution = (period, finest) if beat is None else (beat[0], resolution)
+        on_tick = beat is None
+        period, resolution = (resolution, finest) if beat is None else (beat[0], resolution)
     phase_sd, short = _step_phase(steps, period)
     even, why = _on_grid(times, period, phase_sd, short)
     if meaning == "arrival":
         even = True
     if not even:
         return _uneven(times, period, resolution, why)
-    if len(times) >= FEW and beat is None:
+    if len(times) >= FEW and beat is None and not on_tick:
         period = refined_period(times, period, lag)
         phase_sd, short = _step_phase(steps, period)
     jitter = phase_sd / math.sqrt(2) if short < SHORT_STEPS and phase_sd < math.inf else math.inf
-    coarse = resolution > COARSE * period and _is_rounded(times, period, resolution)
+    coarse = resolution > COARSE * period and not on_tick and _is_rounded(times, period, resolution)
+    coarse = coarse or beat is not None
     time_from, why_time = _time_from(meaning, coarse, jitter, resolution / period)
     # Rounding by more than this moves single steps by as much as a lost sample does.
     fine = not coarse or resolution < ROUNDED_STEPS * period
@@ -112,7 +117,7 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     if not math.isfinite(jitter) or jitter > SMALL_JITTER:
         jitter = _local_jitter(times, period)
     horizon = _horizon(len(times), resolution / period) if beat is None else _beat_horizon(beat[1])
-    noise = _envelope_noise(times, period, horizon if coarse else min(256, horizon))
+    noise = _envelope_noise(times, period, horizon if coarse else min(ENVELOPE_ROWS, horizon))
     # Five sigma of the envelope, and at least half a period.
     least = 1 if steady else max(1, math.ceil(min(5 * noise / period + 0.5, 1e9)))
     why = f"{why}; {why_time}"
@@ -130,9 +135,9 @@ def _step_phase(steps: np.ndarray, period: float) -> tuple[float, float]:
 def _on_grid(times: np.ndarray, period: float, phase_sd: float, short: float) -> tuple[bool, str]:
     rows = len(times)
     if rows < FEW:
-        spread = float(np.std(without_long_steps(np.diff(times)))) / period
-        even = min(spread, phase_sd) < 0.28
-        return even, f"{rows} rows: steps spread by {min(spread, phase_sd):.3g} periods"
+        periods = np.diff(times) / period
+        spread = float(np.std(periods - np.maximum(1, np.rint(periods))))
+        return spread < FEW_SPREAD, f"{rows} rows: steps spread by {spread:.3g} periods"
     if short < SHORT_STEPS and phase_sd <= STRICTLY_EVEN:
         return True, f"steps spread by {phase_sd:.2g} periods"
     if short < SHORT_STEPS and phase_sd < COHERENT:
@@ -214,13 +219,16 @@ def _beat_period(steps: np.ndarray, tick: float) -> tuple[float, float] | None:
 
     See `judge`.
     """
-    ticks = np.rint(steps / tick)
-    odd = np.flatnonzero(ticks != 1)
+    ahead = np.cumsum(np.rint(steps / tick) - 1)
+    ahead = np.maximum.accumulate(ahead if ahead[-1] > 0 else -ahead)
+    # Jitter about a bound of the rounding goes to and fro: only the first time counts.
+    odd = np.flatnonzero(np.diff(ahead, prepend=0.0) > 0)
     apart = np.diff(odd)
-    if len(apart) < MIN_BEATS or np.mean(np.abs(ticks[odd] - 1) == 1) < 0.95:
+    if len(apart) < MIN_BEATS or np.mean(np.diff(ahead[odd]) == 1) < 0.95:
         return None
     if float(apart.std()) >= BEAT_SPREAD * float(apart.mean()):
         return None
+    ticks = np.rint(steps / tick)
     return float(steps[np.abs(ticks - 1) <= 1].mean()), float(apart.mean())
 
 

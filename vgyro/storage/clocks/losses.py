@@ -7,16 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vgyro.storage.clocks.evenness import Judgement, level_slope
+from vgyro.storage.clocks.evenness import ENVELOPE_ROWS, Judgement, level_slope
 from vgyro.storage.clocks.windows import backward_min, forward_min
 
 STRETCH = 1 << 17  # rows judged at a time
 NEAR = 16  # rows on each side of a long step whose median tells the level
 SETTLE = 48  # rows after which the level after a loss is read
-TAIL = 64  # rows that must follow a loss of arrival stamps
+TAIL = 64  # rows that must follow a loss of arrival stamps, at least
 WHOLE = 0.3  # periods by which a lasting step may differ from whole ones
 WHOLE_SHARE = 1e-3  # … and this share of itself
 LONG_STEP = 1.5  # periods
+FLAT = 0.1  # periods by which the middle half of the rows after a loss may differ
 SURELY = 0.05  # periods below a level, for a row to lie before it rose
 
 
@@ -29,6 +30,14 @@ class Found(NamedTuple):
     rows: np.ndarray
     lost: np.ndarray
     shift: np.ndarray
+
+
+def tail_rows(grid: Judgement) -> int:
+    """Rows that must follow a loss: 64, and so many that the noise of their envelope, which shrinks as their number
+    grows, is a tenth of a period; the whole horizon if even that does not show single losses."""
+    if grid.least_loss > 1:
+        return max(TAIL, grid.horizon)
+    return int(max(TAIL, min(grid.horizon, ENVELOPE_ROWS * 10 * grid.noise / grid.period)))
 
 
 def _found(rows: list[int], lost: list[int], shift: list[float]) -> Found:
@@ -117,7 +126,7 @@ class LossFinder:
         the first half of the horizon is not above the second by half a period, as it is while a stall is caught up.
         """
         grid, width = self.judgement, self.judgement.horizon
-        self._period = period = level_slope(times[low:high], self._period, min(256, width), 2 * width)
+        self._period = period = level_slope(times[low:high], self._period, min(ENVELOPE_ROWS, width), 2 * width)
         rest = times - period * np.arange(len(times))
         known = self._raise
         raised = rest.copy()
@@ -128,7 +137,7 @@ class LossFinder:
         ahead = np.minimum(near, np.append(near[half:], np.full(min(half, len(near)), np.inf)))
         lasts = _lasting(rest, near, half, period, last)
         # Rows too near the end of a piece are not judged.
-        stop = min(high, len(times) - TAIL + 1) if last else high
+        stop = min(high, len(times) - tail_rows(grid) + 1) if last else high
         limit = (grid.least_loss - 0.5) * period
         scan = _Scan(raised, ahead, lasts, period, limit, width, grid.noise)
         found = scan.run(max(low, 1), stop)
@@ -216,10 +225,16 @@ class _Scan:
         return np.where(np.isfinite(step), step, -np.inf)
 
     def _height(self, step: np.ndarray, row: int, hit: int) -> float:
-        """The median step of the rows after it, as long as there are as many to come: the rows just before it, and the
-        next loss, may spoil some."""
+        """The median step of the rows after it, as long as there are as many to come.
+
+        The rows just before the loss, and the next loss, may spoil some: the longest of three stretches that is flat
+        counts.
+        """
         settle = min(SETTLE, max(1, (len(self.ahead) - row - hit) // 2))
-        return float(np.median(step[hit : hit + settle]))
+        parts = [step[hit : hit + max(1, rows)] for rows in (settle, settle // 2, settle // 4)]
+        level = [np.quantile(part, [0.25, 0.5, 0.75]).tolist() for part in parts]
+        flat = [middle for low, middle, high in level if high - low < FLAT * self.period]
+        return flat[0] if flat else level[0][1]
 
     def _place(self, row: int, shift: float, stop: int) -> int:
         """The loss comes after the last row that is still below the new level."""

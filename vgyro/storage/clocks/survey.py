@@ -252,7 +252,9 @@ class _Pass:
         if options.rate_hz is not None and abs(rate / options.rate_hz - 1) > RATE_TOLERANCE:
             texts.append(f"the time stamps say {rate:.6g} Hz, {options.rate_hz:g} Hz was declared: the stamps are used")
         if self.filler.bad:
-            texts.append(f"{self.filler.bad} rows have no usable time stamp: their times are interpolated")
+            texts.append(
+                f"{self.filler.bad} rows have no usable time stamp, or one far off: their times are interpolated"
+            )
         if self.unfolder.restarts:
             texts.append(f"the clock began anew {self.unfolder.restarts} times: how long it stood still is not known")
         if self.collector.set_clocks:

@@ -130,4 +130,4 @@ def _divisor(steps: np.ndarray) -> int:
     steps = steps[steps > 0]
     if not len(steps):
         return 1
-    return max(1, int(np.gcd.reduce(steps[steps <= np.quantile(steps, 0.995)])))
+    return max(1, int(np.gcd.reduce(steps[steps <= LONG_STEP * np.quantile(steps, 0.99)])))

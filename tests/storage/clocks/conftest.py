@@ -1,0 +1,33 @@
+"""Logs with known truth."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from clock_cases import LOGS
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(7)
+
+
+@pytest.fixture
+def column():
+    """The first column of one of the shared logs; skipped where they are not at hand."""
+
+    def load(name, separator=","):
+        path = LOGS / name
+        if not path.exists():
+            pytest.skip(f"{path} is not here")
+        values = []
+        for line in path.read_text().splitlines():
+            cell = line.split(separator)[0].strip()
+            if cell and cell.replace(".", "", 1).replace("-", "", 1).isdigit():
+                values.append(float(cell))
+        return np.array(values)
+
+    return load
