@@ -65,3 +65,25 @@ def record(
     if motion is not None:
         rate = rate + (1 + rng.uniform(-scale_error, scale_error)) * motion.at(true_time)
     return Recorded(Stream(origin + own, rate, rate_hz), true_time, bias)
+
+
+def board(
+    rng: np.random.Generator,
+    motion: Motion | None,
+    delays_s: np.ndarray,
+    *,
+    samples: int = 12000,
+    rate_hz: float = 200.0,
+    noise: float | np.ndarray = 0.1,
+    walk: float = 0.0,
+) -> np.ndarray:
+    """Rates [T, N] of gyros that read the motion late; scale errors of 3 %, biases, and a random walk, deg/s/√s."""
+    time = np.arange(samples) / rate_hz
+    gyros = len(delays_s)
+    rate = rng.normal(0, 1, (samples, gyros)) * noise + rng.normal(0, 0.5, gyros)
+    rate += walk / np.sqrt(rate_hz) * np.cumsum(rng.normal(0, 1, (samples, gyros)), axis=0)
+    if motion is not None:
+        scale = 1 + rng.uniform(-0.03, 0.03, gyros)
+        for k, delay in enumerate(delays_s):
+            rate[:, k] += scale[k] * motion.at(time - delay)
+    return rate

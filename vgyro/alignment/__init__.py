@@ -11,6 +11,7 @@ from vgyro.alignment.clock import (
     refuse_clock,
     relative_clock,
 )
+from vgyro.alignment.delays import Delays, relative_delays
 from vgyro.alignment.interpolation import interpolate, noise_gain
 from vgyro.alignment.streams import Stream, positions, resample, stretches
 
@@ -21,6 +22,7 @@ __all__ = [
     "STATUSES",
     "TOO_SHORT",
     "ClockFit",
+    "Delays",
     "Evidence",
     "Stream",
     "interpolate",
@@ -28,6 +30,7 @@ __all__ = [
     "positions",
     "refuse_clock",
     "relative_clock",
+    "relative_delays",
     "resample",
     "stretches",
 ]

@@ -8,7 +8,9 @@ import numpy as np
 
 BLOCK_S = 10.0
 SHORTEST_S = 2.0
-SMOOTHING_HZ = 1.0  # width over which the spectrum of the residual is averaged
+SMOOTHING_HZ = 1.0  # greatest width over which the spectrum of the residual is averaged
+SMOOTHING_BINS = 40  # bins times blocks that are averaged: a red residual is not diluted where blocks are many
+FEWEST_FOR_OWN = 8  # blocks that carry the sum, for their own sums to tell its variance
 
 
 def block_numbers(time: np.ndarray, segment: np.ndarray, length_s: float = BLOCK_S) -> np.ndarray:
@@ -78,9 +80,9 @@ class Blocks:
         weight[[0, -1]] = 1.0
         return weight
 
-    def smoothed(self, spectrum: np.ndarray) -> np.ndarray:
-        """A power spectrum [..., F], averaged over SMOOTHING_HZ."""
-        width = int(SMOOTHING_HZ * self.padded * self.step_s) | 1
+    def smoothed(self, spectrum: np.ndarray, effective: float) -> np.ndarray:
+        """A power spectrum [..., F] of so many blocks, averaged over neighbouring bins."""
+        width = int(min(SMOOTHING_HZ * self.padded * self.step_s, max(SMOOTHING_BINS / effective, 3))) | 1
         width = min(width, 2 * (spectrum.shape[-1] // 2) - 1)
         padded = np.concatenate(
             (spectrum[..., width // 2 : 0 : -1], spectrum, spectrum[..., -2 : -2 - width // 2 : -1]), axis=-1
@@ -94,17 +96,17 @@ def score_covariance(blocks: Blocks, slopes: np.ndarray, residual: np.ndarray) -
 
     slopes : array [P, K], known; residual : array [K], stationary with any colour within a block
     The larger, in each direction of a parameter, of two estimates: that of a residual of one colour (its spectrum
-    averaged over blocks, by their part in the sum, and over 1 Hz) and that of the blocks' own sums (White's).
+    averaged over blocks, by their part in the sum, and over up to 1 Hz) and that of the blocks' own sums (White's).
     """
     weight = blocks.sums(slopes[0] ** 2)
     weight = weight / weight.sum()
     power = np.abs(blocks.spectra(residual)) ** 2 / blocks.size[:, None]
-    colour = blocks.smoothed(weight @ power)
+    effective = 1 / (weight**2).sum()
+    colour = blocks.smoothed(weight @ power, effective)
     transforms = blocks.spectra(slopes)
     bins = blocks.bins / blocks.padded
     even = np.einsum("pbf,qbf,f->pq", transforms, transforms.conj(), colour * bins, optimize=True).real
-    effective = 1 / (weight**2).sum()
-    if effective < 8:
+    if effective < FEWEST_FOR_OWN:
         return even
     own = blocks.sums(slopes * residual)
     own = own @ own.T * effective / (effective - len(slopes))

@@ -56,18 +56,18 @@ def _gains(half: int) -> np.ndarray:
 def interpolate(values: np.ndarray, at: np.ndarray, segment: np.ndarray | None = None) -> np.ndarray:
     """Values between the samples of a series.
 
-    values  : array [T], any unit, evenly sampled within each stretch; NaN where a sample is missing
+    values  : array [T], real or complex, any unit, evenly sampled within each stretch; NaN where a sample is missing
     at      : array [M], positions in samples (2.5 lies between values[2] and values[3]), in any order; NaN allowed
     segment : array [T] int, the number of the gap-free stretch of each sample; none: one stretch
-    returns : array [M] of float, the unit of values; NaN outside of the series, in gaps and next to a NaN. A position
-              on a sample is that sample, also at a border.
+    returns : array [M] of float or complex, the unit of values; NaN outside of the series, in gaps and next to a NaN.
+              A position on a sample is that sample, also at a border.
     raises  : ValueError if segment has another length than values
     Memory beyond the result is bounded: positions are taken 32768 at a time. The error is stated at the top
     of this module.
     """
     values, at = np.asarray(values), np.asarray(at, dtype=float)
     room = _Room(values, segment)
-    result = np.full(len(at), np.nan)
+    result = np.full(len(at), np.nan, dtype=np.result_type(values, float))
     for start in range(0, len(at), AT_ONCE):
         part = slice(start, start + AT_ONCE)
         result[part] = _some(values, at[part], room)
@@ -135,7 +135,7 @@ class _Room:
 
 def _some(values: np.ndarray, at: np.ndarray, room: _Room) -> np.ndarray:
     index, fraction, half = room.around(at)
-    result = np.full(len(at), np.nan)
+    result = np.full(len(at), np.nan, dtype=np.result_type(values, float))
     result[half == 0] = values[index[half == 0]]
     for width in HALF_WIDTHS:
         rows = np.flatnonzero(half == width)

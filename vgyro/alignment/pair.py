@@ -150,9 +150,8 @@ def _bread(overlap: _Overlap, lever: np.ndarray, scale: float) -> np.ndarray:
 def _overlap(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, line: Line) -> _Overlap | None:
     time = reference.time[rows]
     places = np.interp(line.at(time), other.time, np.arange(len(other.time), dtype=float), left=np.nan, right=np.nan)
-    two = interpolate(other.rate, places, other.segment)
-    slope = interpolate(other.derivative, places, other.segment)
-    good = np.isfinite(two) & np.isfinite(slope)
+    two, slope = rate_and_slope(other, places)
+    good = np.isfinite(two)
     size = np.bincount(number, good)
     good &= size[number] * reference.step_s >= SHORTEST_S
     if np.count_nonzero(good) < FEWEST_POINTS:
@@ -171,6 +170,12 @@ def _overlap(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray,
     if not (columns**2).sum(axis=1).all():
         return None
     return _Overlap(blocks, time[good][moving], columns, raw)
+
+
+def rate_and_slope(band: Band, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rate and derivative of a band at positions in its samples; as one complex series, for half the time."""
+    both = interpolate(band.rate + 1j * band.derivative, places, band.segment)
+    return both.real, both.imag
 
 
 def _moving(blocks: Blocks, columns: np.ndarray) -> np.ndarray:
