@@ -64,7 +64,7 @@ include: "workflow/rules/papers.smk"
 
 onsuccess:
     for page in pages_made():
-        print(f"report: {page}")
+        print(f"report: {page.resolve()}")
 
 
 onerror:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from vgyro.calibration.figures import FIGURES
+from vgyro.log import Log
 from vgyro.report.certificate import applied, figure_cell
 from vgyro.report.certificate_plots import certificate_plots
 from vgyro.report.model import DatasetPart
@@ -106,3 +107,18 @@ def test_many_gyros_are_cut_into_tables_that_fit_a_sheet(dataset: DatasetPart) -
 
 def test_every_figure_of_a_calibration_is_explained(dataset: DatasetPart) -> None:
     assert list(dataset.calibration_figures) == list(FIGURES)
+
+
+def test_rates_as_logged_are_not_called_nominal_counts(dataset: DatasetPart) -> None:
+    nominal = {**dataset.calibration, "gyros": {
+        name: {**record, "source": "nominal"} for name, record in dataset.calibration["gyros"].items()
+    }}  # fmt: skip
+    counts = replace(dataset, calibration=nominal)
+    assert "Nominal scale" in str(calibration_part(counts))
+    log = Log(values="rates")
+    recordings = tuple(one.model_copy(update={"log": log}) for one in dataset.manifest.recordings)
+    logged = replace(counts, manifest=dataset.manifest.model_copy(update={"recordings": recordings}))
+    html = str(calibration_part(logged))
+    assert "Rates as logged" in html
+    assert "Nominal scale" not in html
+    assert "deg/s a count" not in html

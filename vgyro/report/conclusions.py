@@ -15,7 +15,7 @@ from vgyro.report.fits import NO_USE
 from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, rows_of
 from vgyro.report.noise import OVERLAPPING
 from vgyro.report.numbers import percent, significant
-from vgyro.report.scale import nominal
+from vgyro.report.scale import nominal, rates_as_logged
 from vgyro.report.sentences import Conclusion, moved_words, named
 from vgyro.report.suspicions import suspicion_sentences
 
@@ -172,6 +172,8 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
     if unmeasured:
         whose = "every gyro" if len(unmeasured) == len(dataset.board.gyros) else named(unmeasured)
         words = f"Nominal scale for {whose}: absolute figures carry the data sheet's error."
+        if rates_as_logged(dataset):
+            words = f"Rates as logged for {whose}: absolute figures carry the error of a scale that was not measured here."
         found.append(Conclusion(words, "warn", "calibration"))
     for recording in dataset.recordings:
         found += _incomplete(recording)

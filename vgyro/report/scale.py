@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from markupsafe import Markup
 
+from vgyro.dataset import values_of
 from vgyro.report.certificate import certificate
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import DatasetPart, Record
@@ -16,6 +17,17 @@ FEW = 8
 NOMINAL_WORDS = (
     "Nominal scale: there is no calibration recording for these gyros, so the board's data-sheet values are used, and "
     "every figure below in deg/s, deg/h or deg/√h carries their error (several percent for most MEMS gyros)."
+)
+LOGGED_WORDS = (
+    "Rates as logged: the log holds them in a unit of rate, so whoever wrote it chose the scale, and there is no "
+    "calibration recording to check it by. Every figure below in deg/s, deg/h or deg/√h carries its error (several percent "
+    "for most MEMS gyros)."
+)
+LOGGED_COLUMNS = (
+    Column("gyro", numeric=False),
+    Column("axis", numeric=False),
+    Column("column of the log", numeric=False),
+    Column("unit", numeric=False),
 )
 COLUMNS = (
     Column("gyro", numeric=False),
@@ -33,7 +45,9 @@ def calibration_part(dataset: DatasetPart) -> Markup:
     skipped = dataset.calibration.get("skipped") or {}
     parts = [paragraph(f"{name} gave no calibration: {reason}", "warn") for name, reason in skipped.items()]
     unmeasured = {name: gyros[name] for name in nominal(dataset)}
-    if unmeasured:
+    if unmeasured and rates_as_logged(dataset):
+        parts += [paragraph(LOGGED_WORDS, "warn"), _logged_table(dataset)]
+    elif unmeasured:
         axes = {gyro.name: gyro.axis for gyro in dataset.board.gyros}
         rows = [_nominal_row(name, axes.get(name, MISSING), record) for name, record in unmeasured.items()]
         table = render_table(COLUMNS, rows)
@@ -47,6 +61,23 @@ def calibration_part(dataset: DatasetPart) -> Markup:
 def nominal(dataset: DatasetPart) -> list[str]:
     """Names of the gyros whose scale is the data sheet's."""
     return [name for name, record in dataset.calibration.get("gyros", {}).items() if record.get("source") == "nominal"]
+
+
+def rates_as_logged(dataset: DatasetPart) -> bool:
+    """Do all recordings hold rates, which nothing here scaled?"""
+    manifest = dataset.manifest
+    return all(values_of(manifest, recording) == "rates" for recording in manifest.recordings)
+
+
+def _logged_table(dataset: DatasetPart) -> Markup:
+    """Where each gyro stands in the log; empty where a board file says so."""
+    array = dataset.manifest.array
+    if array is None:
+        return Markup("")
+    columns = array.columns
+    rows = [[Cell(gyro.name), Cell(gyro.axis), Cell(columns[gyro.name]), Cell(str(gyro.unit))] for gyro in array.gyros]
+    table = render_table(LOGGED_COLUMNS, rows)
+    return details(f"Columns of {len(rows)} gyros", table) if len(rows) > FEW else table
 
 
 def _measured(dataset: DatasetPart, axis: str) -> dict[str, Record]:
