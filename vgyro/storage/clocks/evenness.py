@@ -16,6 +16,7 @@ from vgyro.storage.clocks.windows import (
     rough_period,
 )
 
+SHORTEST_PERIOD = 1e-9  # s; less is no advance
 FEW = 64  # rows; fewer tell little …
 FEW_SPREAD = 0.28  # … but how far steps are from whole periods, r.m.s.
 STRICTLY_EVEN = 0.005  # s.d. of the steps, periods: too little to accumulate within a few hundred rows
@@ -91,7 +92,7 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     if len(times) < 2:
         return None
     period, lag = rough_period(times)
-    if not (period > 0 and math.isfinite(1 / period)):
+    if not period >= SHORTEST_PERIOD:
         return None
     steps, beat, on_tick = np.diff(times), None, False
     if 0.95 < period / resolution < 1.05:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vgyro.storage.clocks.evenness import Judgement, judge
+from vgyro.storage.clocks.evenness import SHORTEST_PERIOD, Judgement, judge
 from vgyro.storage.clocks.model import ClockOptions
 from vgyro.storage.clocks.repeats import Keeper, KeepRule, keep_rule
 from vgyro.storage.clocks.unfold import DAY_S, Unfolder, UnfoldRule, fits, known_wraps, spikes, usable
@@ -103,7 +103,7 @@ def _unfold_rule(values: np.ndarray, unit: str, scale: float, options: ClockOpti
     steps = np.where(steps < -usual, np.median(upward), steps)
     times = np.concatenate([[0.0], np.cumsum(without_long_steps(steps))])
     period, _ = rough_period(times)
-    if not period > 0:
+    if not period * scale >= SHORTEST_PERIOD:
         return None
     usual = max(usual, 2 * period)
     back = max(BACK_PERIODS * period, BACK_SPREADS * robust_sd(steps))

@@ -227,14 +227,16 @@ class _Scan:
     def _height(self, step: np.ndarray, row: int, hit: int) -> float:
         """The median step of the rows after it, as long as there are as many to come.
 
-        The rows just before the loss, and the next loss, may spoil some: the longest of three stretches that is flat
-        counts.
+        The rows just before the loss, and the next loss, may spoil some: if they are not flat, shorter stretches may
+        tell whole periods.
         """
         settle = min(SETTLE, max(1, (len(self.ahead) - row - hit) // 2))
         parts = [step[hit : hit + max(1, rows)] for rows in (settle, settle // 2, settle // 4)]
         level = [np.quantile(part, [0.25, 0.5, 0.75]).tolist() for part in parts]
-        flat = [middle for low, middle, high in level if high - low < FLAT * self.period]
-        return flat[0] if flat else level[0][1]
+        if level[0][2] - level[0][0] < FLAT * self.period:
+            return level[0][1]
+        whole = [middle for _, middle, _ in level if self._weigh(middle)[0]]
+        return whole[0] if whole else level[0][1]
 
     def _place(self, row: int, shift: float, stop: int) -> int:
         """The loss comes after the last row that is still below the new level."""

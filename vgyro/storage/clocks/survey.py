@@ -11,7 +11,7 @@ import numpy as np
 from vgyro import units
 from vgyro.errors import DataError
 from vgyro.storage.clocks.clock import Clock, Track
-from vgyro.storage.clocks.evenness import Judgement
+from vgyro.storage.clocks.evenness import SHORTEST_PERIOD, Judgement
 from vgyro.storage.clocks.head import Rules, look
 from vgyro.storage.clocks.lines import Fit, Line, fit_lines
 from vgyro.storage.clocks.model import MAX_GAPS, ClockGap, ClockOptions, ClockRecord
@@ -106,7 +106,7 @@ class _Pass:
         self.collector.feed(tail, np.zeros(len(tail), dtype=bool))
         self.collector.close()
         fit = _fit(self.collector, judgement)
-        if not (np.isfinite(fit.period) and fit.period > 0 and np.isfinite(1 / fit.period)):
+        if not fit.period >= SHORTEST_PERIOD:
             raise DataError("the time stamps do not advance", None, REMEDY)
         track = self._track(fit, judgement)
         return Clock(self.rules, track, self._record(options, fit, track, judgement))
@@ -183,7 +183,7 @@ class _Pass:
         gaps = self._gaps(fit, track, judgement)
         day = options.day
         uneven = 0.0
-        if not judgement.even and collector.step_count:
+        if not judgement.even and collector.step_sum > 0:
             mean = collector.step_sum / collector.step_count
             uneven = float(np.sqrt(max(0.0, collector.step_squares / collector.step_count - mean**2)) / mean)
         meaning: Literal["sampled", "arrival"] = "arrival" if judgement.time_from == "envelope" else "sampled"

@@ -9,7 +9,7 @@ SHARP = 0.02  # spread of the mean step over a lag, at which it is taken for the
 STEADY_STEPS = 0.25  # spread of single steps, at which their middle is taken for the period if bursts are absent
 SHORT_STEPS = 0.05  # share of steps below half a period, from which on rows come in bursts
 LONG_STEP = 5  # times the 99th percentile of forward steps: such a one says nothing about the usual period
-FIRST_LAG = 16
+FIRST_LAG, ENOUGH_LAG = 16, 4096
 MOST_OFF = 0.1  # of itself, that a rough period may be off
 
 
@@ -83,7 +83,9 @@ def refined_period(times: np.ndarray, period: float, rough_lag: int) -> float:
     rows = np.arange(len(times))
     rough = rough_lag > 1  # single steps tell the period well enough
     lag = max(1, min(FIRST_LAG if rough else 2, len(times) // 8))
-    while lag <= len(times) // 2:
+    # Longer lags would tell more of what happens in between: a clock that is set, drift.
+    longest = min(len(times) // 2, max(ENOUGH_LAG, 2 * rough_lag))
+    while lag <= longest:
         width = max(1, min(256, lag, len(times) // 16))
         # The last rows have no full window ahead of them.
         envelope = (forward_min(times - period * rows, width) + period * rows)[: len(times) - width + 1]
