@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters
 from vgyro.fusion import missing as module
+from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.missing import fill_missing
 
 RATE_HZ, SIGMA = 100.0, 0.05
@@ -101,3 +103,16 @@ def test_pieces_change_nothing(monkeypatch):
     monkeypatch.setattr(module, "PIECE", 700)
     fill_missing(parts, RATE_HZ)
     np.testing.assert_allclose(parts, whole, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["dropout", "stuck"])
+def test_a_gyro_that_is_out_from_the_first_sample_to_the_last(kind):
+    # Its bias is never seen: the others go on with theirs.
+    rate = np.asfortranarray(array()[:, :4] - 30 * np.sin(np.arange(6000) / RATE_HZ)[:, None])
+    noise = ArrayNoise(np.full(4, SIGMA / 10), np.full(4, 1e-4), np.eye(4))
+    fault = FaultEvent(1, kind, 0, 6000, np.inf, np.nan, "")
+    whole = ArrayRates(rate, RATE_HZ, np.zeros(6000, np.int32), np.ones(6000, bool), noise, faults=(fault,))
+    for name in ("recommended", "recommended_unsmoothed"):
+        fused = METHODS[name].fuse(whole, FilterParameters())
+        assert np.isfinite(fused.rate).all()
+        assert fused.rate.std() < SIGMA

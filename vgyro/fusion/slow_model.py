@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -128,6 +129,13 @@ class Evidence:
         """Temperature slopes are among the constants."""
         return self.design.shape[2] > self.plain
 
+    @cached_property
+    def unseen(self) -> np.ndarray:
+        """Rows of Filtered.squares of the gyros that no block uses: at fault throughout, or without any value."""
+        gone = np.flatnonzero(~(self.weight != 0).any(axis=(0, 2)))
+        starts = [0, *([self.plain - self.scales] if self.scales else []), *([self.plain] if self.has_slopes else [])]
+        return np.concatenate([1 + start + gone for start in starts])
+
     @property
     def of_biases(self) -> np.ndarray:
         """Regressors [B, N, k] of the biases: D without the scale errors, for these are none."""
@@ -155,7 +163,7 @@ class Evidence:
         """The filter's forward pass with each of several walks.
 
         What rounding takes for information on the constants, or against it, is taken out: without anchors their common
-        parts are not seen at all, and nowhere is there less than none.
+        parts are not seen at all, nor is a gyro that no block uses, and nowhere is there less than none.
         """
         steps = np.stack([np.outer(one.rrw, one.rrw) * self.walks for one in walks])
         taus = np.array([one.tau_s for one in walks])
@@ -171,6 +179,7 @@ class Evidence:
                 squares[:, rows] -= squares[:, rows].mean(axis=1)[:, None]
         values, vectors = np.linalg.eigh((squares[1:, 1:] + squares[1:, 1:].T) / 2)
         squares[1:, 1:] = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        squares[self.unseen] = squares[:, self.unseen] = 0.0
         return replace(filtered, squares=squares)
 
 
