@@ -79,8 +79,8 @@ def dynamic_figures(
         del error, sd
         readings.append(row | _shifted(errors_of(rate, truth), options))
         raw.append(units)
-    for place, row in (own or {}).items():
-        readings[place].update(row)
+    for place, figures in (own or {}).items():
+        readings[place].update(figures)
     drawn = resample(joined(raw), options.bootstrap, options.seed)
     for column in range(singles, len(readings)):
         readings[column].update(_factors(readings, drawn, singles, column, options.confidence))

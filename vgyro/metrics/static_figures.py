@@ -90,8 +90,8 @@ def array_figures(
         if shared.poses:
             row["sigma"] = replace(row["sigma"], note=f"{POSE_NOTE}; {row['sigma'].note}")
     _add_equal(readings, shared, array, confidence)
-    for place, row in (own or {}).items():
-        readings[place].update(row)
+    for place, figures in (own or {}).items():
+        readings[place].update(figures)
     for column in range(singles, len(measured)):
         readings[column].update(array.factors(readings, column, confidence))
     return StaticFigures([one.curves for one in measured], [one.spectrum for one in measured], readings, array.cross)
