@@ -51,7 +51,7 @@ def write_rates(path: Path, recording: str) -> None:
     for name in (*GYROS, "solo"):
         drift = 0.0004 * np.cumsum(rng.normal(size=len(time)))
         columns[name] = truth + drift + NOISE.get(name, 0.05) * rng.normal(size=len(time))
-    write_table(path, columns, "rates", PROVENANCE, {"rate_hz": 10.0})
+    write_table(path, columns, "rates", PROVENANCE, {"rate_hz": 10.0, "delays": {}})
 
 
 def write_array(folder: Path, recording: str, axis: str, gyros: tuple[str, ...], failed_check: bool) -> None:

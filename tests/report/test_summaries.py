@@ -77,7 +77,7 @@ def test_rates_are_thinned_with_their_rest(tmp_path: Path, samples: int) -> None
     path = tmp_path / "rates.parquet"
     columns = {"time": time, "segment": np.zeros(samples, dtype=np.int32), "at_rest": at_rest, "temp_t1": 20 + time,
                "g1": rate.astype(np.float32), "reference": np.full(samples, np.nan)}  # fmt: skip
-    write_table(path, columns, "rates", PROVENANCE, {"rate_hz": 200.0})
+    write_table(path, columns, "rates", PROVENANCE, {"rate_hz": 200.0, "delays": {}})
     found = read_rates(path, ["g1", "g2"])
     stored = read_columns(path, ["g1"])["g1"]
     assert list(found.gyros) == ["g1"]

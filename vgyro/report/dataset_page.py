@@ -11,6 +11,7 @@ from vgyro.report.best import BEST_RULES, Best, best_of_all
 from vgyro.report.conclusions import BAD_RULE, bad_gyros, conclude, main_arrays
 from vgyro.report.conventions import conventions_part, provenance_part
 from vgyro.report.crosscheck import crosscheck_part
+from vgyro.report.delays import delays_part
 from vgyro.report.faults import FAULT_RULE, faults_part
 from vgyro.report.html import bullets, details, heading, join, macro, paragraph
 from vgyro.report.methods import dynamic_table, response_table, rest_tables
@@ -71,6 +72,7 @@ def _child(dataset: DatasetPart, array: ArrayPart, opened: bool) -> Section:
     html = join(
         rates_plots(recording, array),
         temperature_plot(recording) if first else "",
+        delays_part(recording, array),
         faults_part(dataset, array),
         heading("Correlation", 4),
         correlation_table(recording, array),

@@ -50,6 +50,7 @@ class RatesPart:
     temperature_time [P], temperatures {name: [P]} : some samples
     moved       : where the board moved though the recording is declared to be at rest: share of it, stretches in s;
                   None: it did not
+    delays      : axis → delays between its gyros: status, moving_s, and delay_s, low_s, high_s, removed of each gyro
     """
 
     time: np.ndarray
@@ -61,6 +62,7 @@ class RatesPart:
     temperature_time: np.ndarray
     temperatures: Table
     moved: Record | None = None
+    delays: Record = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

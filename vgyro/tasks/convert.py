@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from vgyro.storage.frames import gyro_rails
 from vgyro.storage.tables import TableWriter, read_batches, read_column, read_json
 from vgyro.tasks.block_means import between, block_means
 from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.delays import lateness
 from vgyro.tasks.moves import moves_of
 from vgyro.tasks.reference_log import read_reference
 
@@ -60,32 +61,34 @@ def main(task: Task) -> None:
         if mask.any() and mask.mean() <= MOSTLY_CLIPPED:
             at_rest &= ~mask
     reference = reference_of(converter, frames, time, task.inputs.get("reference", []))
-    extra: dict[str, Any] = {
-        "rate_hz": rate_hz,
-        "clipped": {name: int(mask.sum()) for name, mask in clipped.items()},
-        "calibration": {
-            name: "rates as logged" if converter.rates else row["source"] for name, row in converter.gyros.items()
-        },
-        "temperature": {gyro.name: converter.compensation_record(gyro) for gyro in board.gyros},
-    }
-    extra |= missing_record(frames, board)
+    late = lateness(converter, frames, rate_hz)
+    extra = {"rate_hz": rate_hz, **converter.about(clipped), **missing_record(frames, board), "delays": late.record}
+    if late.rates:
+        # Between its samples a late gyro has no value at the ends and beside a missing one.
+        extra["missing"] = missing_of(extra.get("missing", {}), late.rates)
     if moves is not None:
         extra["moved"] = moves.record
     if reference is not None:
         extra["reference_axis"] = recording.axis or board.axes[0]
     with TableWriter(task.output("rates"), "rates", task.provenance(), extra) as writer:
         first = 0
-        for raw in read_batches(frames, converter.columns):
+        for raw in _batches(frames, converter.columns):
             rows = slice(first, first + len(raw["time"]))
             known = {} if reference is None else {"reference": reference[rows]}
             head = {"time": raw["time"], "segment": raw["segment"], "at_rest": at_rest[rows]}
-            writer.append({**head, **known, **converter.temperatures(raw), **converter.rates_of(raw)})
+            rates = converter.rates_of(raw) | {name: rate[rows] for name, rate in late.rates.items()}
+            writer.append({**head, **known, **converter.temperatures(raw), **rates})
             first = rows.stop
-        if first == 0:
-            raw = dict.fromkeys(converter.columns, np.empty(0))
-            head = {"time": np.empty(0), "segment": np.empty(0, np.int32), "at_rest": np.empty(0, bool)}
-            known = {} if reference is None else {"reference": np.empty(0)}
-            writer.append({**head, **known, **converter.temperatures(raw), **converter.rates_of(raw)})
+
+
+def _batches(frames: Path, columns: list[str]) -> Iterator[dict[str, np.ndarray]]:
+    """Columns of frames.parquet piece by piece; of a refused recording, which has no rows, one empty piece."""
+    begun = False
+    for raw in read_batches(frames, columns):
+        begun = True
+        yield raw
+    if not begun:
+        yield {**dict.fromkeys(columns, np.empty(0)), "segment": np.empty(0, np.int32)}
 
 
 class Converter:
@@ -160,6 +163,16 @@ class Converter:
             "note": f"{note}; in-sample: found on this recording" if in_sample else note,
         }
 
+    def about(self, clipped: dict[str, np.ndarray]) -> dict[str, Any]:
+        """Metadata of rates.parquet: clipped samples, where each scale is from, what was done about the temperature."""
+        return {
+            "clipped": {name: int(mask.sum()) for name, mask in clipped.items()},
+            "calibration": {
+                name: "rates as logged" if self.rates else row["source"] for name, row in self.gyros.items()
+            },
+            "temperature": {gyro.name: self.compensation_record(gyro) for gyro in self.board.gyros},
+        }
+
     def temperatures(self, raw: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """temp_<name> → °C."""
         return {f"temp_{t.name}": raw[t.field].astype(float) * t.scale + t.offset for t in self.board.temperatures}
@@ -211,6 +224,11 @@ def missing_record(frames: Path, board: Board) -> dict[str, dict[str, int]]:
                 lost[axis] += int(np.logical_and.reduce([gone[name] for name in members]).sum())
     found = {"missing": missing, "lost_rows": {axis: rows for axis, rows in lost.items() if rows}}
     return {name: record for name, record in found.items() if any(record.values())}
+
+
+def missing_of(missing: dict[str, int], rates: Mapping[str, np.ndarray]) -> dict[str, int]:
+    """Samples without a value of each gyro, those of `rates` counted anew."""
+    return {**missing, **{name: int(np.isnan(rate).sum()) for name, rate in rates.items()}}
 
 
 def compensations_of(calibration: dict[str, Any]) -> dict[str, Compensation]:

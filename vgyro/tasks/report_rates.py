@@ -55,6 +55,7 @@ def read_rates(path: Path, gyros: list[str]) -> RatesPart:
         temperature_time=some["time"],
         temperatures={name.removeprefix(TEMPERATURE): some[name] for name in temperatures},
         moved=metadata.get("moved"),
+        delays=metadata["delays"],
     )
 
 
