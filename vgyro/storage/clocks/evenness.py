@@ -31,8 +31,16 @@ BEYOND_USUAL = 2.0  # … times the 99.9th percentile of the steps …
 FEW_STEPS = 1000  # … or, of fewer steps, times the former bound
 ROUNDED_STEPS = 0.3  # resolution, periods
 MIN_BEATS, BEAT_SPREAD = 8, 0.3  # regular odd steps: distances between them, and their s.d. over their mean
+BURST_ROWS = 32  # of the envelope in which odd steps of bursts are looked for
 ENVELOPE_ROWS = 256  # of the blocks whose minima tell the noise of the envelope
 HORIZON, LONGEST_HORIZON = 2048, 65_536  # rows over which an envelope is taken
+
+
+class Beat(NamedTuple):
+    """rows: between odd steps; factor: the period in mean steps over that in usual steps."""
+
+    rows: float
+    factor: float
 
 
 class Judgement(NamedTuple):
@@ -81,6 +89,7 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     3. Off the grid: sampled unevenly, time is the stamp.
     Steps that are all the resolution or a multiple: samples are missing, unless the odd ones come regularly (nine or
     more, distances with a s.d. below 0.3 of their mean, chance gives 1): then the period is no whole number of ticks.
+    Likewise for bursts of nearly a whole number of samples.
     What this cannot tell: latency that wanders over more than m rows looks like a walk, and a lost sample at regular
     distances like rounding, if the period is one tick.
 
@@ -96,9 +105,9 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
         return None
     steps, beat, on_tick = np.diff(times), None, False
     if 0.95 < period / resolution < 1.05:
-        beat = _beat_period(steps, resolution)
+        beat = _beat(np.rint(steps / resolution))
         on_tick = beat is None
-        period, resolution = (resolution, finest) if beat is None else (beat[0], resolution)
+        period, resolution = (resolution, finest) if beat is None else (resolution * beat.factor, resolution)
     phase_sd, short = _step_phase(steps, period)
     even, why = _on_grid(times, period, phase_sd, short)
     if meaning == "arrival":
@@ -108,17 +117,19 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     if len(times) >= FEW and beat is None and not on_tick:
         period = refined_period(times, period, lag)
         phase_sd, short = _step_phase(steps, period)
-    jitter = phase_sd / math.sqrt(2) if short < SHORT_STEPS and phase_sd < math.inf else math.inf
     coarse = resolution > COARSE * period and not on_tick and _is_rounded(times, period, resolution)
     coarse = coarse or beat is not None
+    if short >= SHORT_STEPS and not coarse and (beat := _beat_of_bursts(times, period)) is not None:
+        period *= beat.factor
+    jitter = phase_sd / math.sqrt(2) if short < SHORT_STEPS and phase_sd < math.inf else math.inf
     time_from, why_time = _time_from(meaning, coarse, jitter, resolution / period)
     # Rounding by more than this moves single steps by as much as a lost sample does.
     fine = not coarse or resolution < ROUNDED_STEPS * period
     steady = jitter < STEADY_JITTER and time_from != "envelope" and fine
     if not math.isfinite(jitter) or jitter > SMALL_JITTER:
         jitter = _local_jitter(times, period)
-    horizon = _horizon(len(times), resolution / period) if beat is None else _beat_horizon(beat[1])
-    noise = _envelope_noise(times, period, horizon if coarse else min(ENVELOPE_ROWS, horizon))
+    horizon = _horizon(len(times), resolution / period) if beat is None else _beat_horizon(beat.rows)
+    noise = _envelope_noise(times, period, horizon if coarse or beat else min(ENVELOPE_ROWS, horizon))
     # Five sigma of the envelope, and at least half a period.
     least = 1 if steady else max(1, math.ceil(min(5 * noise / period + 0.5, 1e9)))
     why = f"{why}; {why_time}"
@@ -215,12 +226,12 @@ def _is_rounded(times: np.ndarray, period: float, resolution: float) -> bool:
     return False
 
 
-def _beat_period(steps: np.ndarray, tick: float) -> tuple[float, float] | None:
-    """The period behind steps of one tick with regular odd ones, and rows between these; None if they are not regular.
+def _beat(ticks: np.ndarray) -> Beat | None:
+    """Odd steps that come regularly; None if they do not. See `judge`.
 
-    See `judge`.
+    ticks : [n], whole periods (or ticks) from row to row
     """
-    ahead = np.cumsum(np.rint(steps / tick) - 1)
+    ahead = np.cumsum(ticks - 1)
     ahead = np.maximum.accumulate(ahead if ahead[-1] > 0 else -ahead)
     # Jitter about a bound of the rounding goes to and fro: only the first time counts.
     odd = np.flatnonzero(np.diff(ahead, prepend=0.0) > 0)
@@ -229,8 +240,16 @@ def _beat_period(steps: np.ndarray, tick: float) -> tuple[float, float] | None:
         return None
     if float(apart.std()) >= BEAT_SPREAD * float(apart.mean()):
         return None
-    ticks = np.rint(steps / tick)
-    return float(steps[np.abs(ticks - 1) <= 1].mean()), float(apart.mean())
+    rows = float(apart.mean())
+    return Beat(rows, 1 + np.sign(ticks.mean() - 1) / rows)
+
+
+def _beat_of_bursts(times: np.ndarray, period: float) -> Beat | None:
+    """Bursts of nearly a whole number of samples: the period seems to be a fraction of the burst's, with odd steps."""
+    width = max(1, min(BURST_ROWS, len(times) // 16))
+    envelope = forward_min(times / period - np.arange(len(times)), width)[: len(times) - width + 1]
+    phase = float(np.angle(np.exp(2j * np.pi * envelope).mean())) / (2 * np.pi)
+    return _beat(np.diff(np.rint(envelope - phase)) + 1)
 
 
 def _beat_horizon(rows: float) -> int:
@@ -256,9 +275,9 @@ def _envelope_noise(times: np.ndarray, period: float, width: int) -> float:
     return robust_sd(np.diff(envelope))
 
 
-def level_slope(times: np.ndarray, period: float, width: int, apart: int) -> float:
-    """The local period, from minima of blocks of `width` rows, `apart` rows from each other; losses are folded away."""
-    lag = max(1, apart // width)
+def level_slope(times: np.ndarray, period: float, width: int) -> float:
+    """The local period, from minima of blocks of `width` rows, two blocks apart; losses are folded away."""
+    lag = 2
     blocks = _blocks(times, period, width).min(axis=1)
     if len(blocks) < 4 * lag:
         return period

@@ -13,6 +13,7 @@ from vgyro.storage.clocks.windows import backward_min, forward_min
 STRETCH = 1 << 17  # rows judged at a time
 NEAR = 16  # rows on each side of a long step whose median tells the level
 SETTLE = 48  # rows after which the level after a loss is read
+REACH = 4 * SETTLE  # … or later, where bursts of nearly a whole number of samples hide it for a while
 TAIL = 64  # rows that must follow a loss of arrival stamps, at least
 WHOLE = 0.3  # periods by which a lasting step may differ from whole ones
 WHOLE_SHARE = 1e-3  # … and this share of itself
@@ -56,7 +57,7 @@ class LossFinder:
         self._back, self._ahead = {
             "steps": (NEAR, NEAR),
             "pauses": (1, 0),
-            "level": (judgement.horizon, judgement.horizon + SETTLE),
+            "level": (judgement.horizon, judgement.horizon + REACH),
         }[judgement.losses]
         self._reset()
 
@@ -126,7 +127,7 @@ class LossFinder:
         the first half of the horizon is not above the second by half a period, as it is while a stall is caught up.
         """
         grid, width = self.judgement, self.judgement.horizon
-        self._period = period = level_slope(times[low:high], self._period, min(ENVELOPE_ROWS, width), 2 * width)
+        self._period = period = level_slope(times[low:high], self._period, width)
         rest = times - period * np.arange(len(times))
         known = self._raise
         raised = rest.copy()
@@ -219,33 +220,34 @@ class _Scan:
         return row, self._height(self._steps(max(0, row - self.width), row, row + 1), row, 0)
 
     def _steps(self, origin: int, row: int, end: int) -> np.ndarray:
-        """The step at rows from `row` to SETTLE after `end`, with what was found so far taken away."""
-        behind = backward_min(self.raised[origin : end + SETTLE], self.width)[row - origin :]
+        """The step at rows from `row` to REACH after `end`, with what was found so far taken away."""
+        behind = backward_min(self.raised[origin : end + REACH], self.width)[row - origin :]
         step = self.ahead[row : row + len(behind)] - behind
         return np.where(np.isfinite(step), step, -np.inf)
 
     def _height(self, step: np.ndarray, row: int, hit: int) -> float:
         """The median step of the rows after it, as long as there are as many to come.
 
-        The rows just before the loss, and the next loss, may spoil some: if they are not flat, shorter stretches may
-        tell whole periods.
+        The rows just before the loss, and the next loss, may spoil some: if it is not whole, shorter stretches (unless
+        the first is flat) or later ones may tell whole periods.
         """
         settle = min(SETTLE, max(1, (len(self.ahead) - row - hit) // 2))
-        parts = [step[hit : hit + max(1, rows)] for rows in (settle, settle // 2, settle // 4)]
-        level = [np.quantile(part, [0.25, 0.5, 0.75]).tolist() for part in parts]
-        if level[0][2] - level[0][0] < FLAT * self.period:
-            return level[0][1]
-        whole = [middle for _, middle, _ in level if self._weigh(middle)[0]]
-        return whole[0] if whole else level[0][1]
+        near = step[hit : hit + settle]
+        low, middle, high = np.quantile(near, [0.25, 0.5, 0.75]).tolist()
+        others = [near[: settle // 2], near[: settle // 4]] if high - low >= FLAT * self.period else []
+        if settle == SETTLE and len(self.ahead) - row - hit > 2 * REACH:
+            others += [step[hit + settle : hit + 2 * settle], step[hit + 2 * settle : hit + REACH]]
+        heights = [middle, *(float(np.median(part)) for part in others if len(part))]
+        return next((height for height in heights if self._weigh(height)[0]), middle)
 
     def _place(self, row: int, shift: float, stop: int) -> int:
         """The loss comes after the last row that is still below the new level."""
-        end = min(row + SETTLE, stop)
+        end = min(row + REACH, stop)
         level = float(self.raised[max(0, row - self.width) : row].min()) + shift
         low = np.flatnonzero(self.raised[row:end] < level - max(SURELY * self.period, 3 * self.noise))
         row = min(row + int(low[-1]) + 1, stop - 1) if len(low) else row
         # A row that is on the wrong side after all must not hide the next loss, or make one.
-        self.raised[row : row + SETTLE] = np.maximum(self.raised[row : row + SETTLE], level)
+        self.raised[row : row + REACH] = np.maximum(self.raised[row : row + REACH], level)
         return row
 
     def _weigh(self, height: float) -> tuple[int, float]:

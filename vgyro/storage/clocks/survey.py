@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Literal
@@ -154,11 +155,11 @@ class _Pass:
         on_line = judgement.time_from != "stamps"
         if on_line:
             times = [0.0]
-        for before, piece, line in zip(pieces[:-1], pieces[1:], fit.lines[:-1] or [None] * len(pieces), strict=False):
+        for number, (before, piece) in enumerate(itertools.pairwise(pieces)):
             gap = fit.period if piece.restart else piece.elapsed
             missing = 0 if piece.restart else max(0, round(gap / fit.period) - 1)
             counters.append(counters[-1] + before.counter + 1 + missing)
-            end = float(line(np.array([float(before.counter)]))[0]) if line is not None and on_line else 0.0
+            end = float(fit.lines[number](np.array([float(before.counter)]))[0]) if on_line else 0.0
             times.append(times[-1] + end + gap if on_line else piece.first)
             events.append(piece.start)
             lost.append(missing)
@@ -188,8 +189,6 @@ class _Pass:
             uneven = float(np.sqrt(max(0.0, collector.step_squares / collector.step_count - mean**2)) / mean)
         meaning: Literal["sampled", "arrival"] = "arrival" if judgement.time_from == "envelope" else "sampled"
         wrap = self.unfolder.wrap if self.unfolder.wraps else None
-        turned = self.keeper.held_back
-        readings = self.kept
         return ClockRecord(
             meaning=meaning,
             even=judgement.even,
@@ -208,7 +207,7 @@ class _Pass:
             midnights=self.unfolder.wraps if day else 0,
             restarts=self.unfolder.restarts,
             repeated=self.keeper.repeated,
-            held=(readings + turned) / readings if rules.keep.held > 1 else 1.0,
+            held=(self.kept + self.keeper.held_back) / self.kept if rules.keep.held > 1 else 1.0,
             lost=int(track.lost[-1]),
             least_loss=judgement.least_loss if judgement.even else None,
             uneven=uneven,
