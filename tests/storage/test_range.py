@@ -1,5 +1,7 @@
 """What lies out of a board's range: one rule for decode and convert, and a recording that is nowhere within it."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -43,7 +45,7 @@ def record_of(board: Board, columns: list[np.ndarray], options: IntegrityOptions
 def clipped(share: float) -> np.ndarray:
     """Noise, a share of which is beyond the range; one value has no number."""
     values = np.random.default_rng(1).normal(0, 5, SAMPLES)
-    values[: round(share * SAMPLES)] = 40_000.0
+    values[: math.floor(share * (SAMPLES - 1))] = 40_000.0
     values[-1] = np.nan
     return values
 
