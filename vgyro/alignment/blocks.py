@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from scipy import stats
 
 BLOCK_S = 10.0
 SHORTEST_S = 2.0
@@ -97,6 +98,8 @@ def score_covariance(blocks: Blocks, slopes: np.ndarray, residual: np.ndarray) -
     slopes : array [P, K], known; residual : array [K], stationary with any colour within a block
     The larger, in each direction of a parameter, of two estimates: that of a residual of one colour (its spectrum
     averaged over blocks, by their part in the sum, and over up to 1 Hz) and that of the blocks' own sums (White's).
+    Where few blocks carry the sum it is widened, so that 1.96 standard errors cover 95 % (Student's t, four degrees of
+    freedom a block).
     """
     weight = blocks.sums(slopes[0] ** 2)
     weight = weight / weight.sum()
@@ -106,6 +109,7 @@ def score_covariance(blocks: Blocks, slopes: np.ndarray, residual: np.ndarray) -
     transforms = blocks.spectra(slopes)
     bins = blocks.bins / blocks.padded
     even = np.einsum("pbf,qbf,f->pq", transforms, transforms.conj(), colour * bins, optimize=True).real
+    even *= (float(stats.t.ppf(0.975, 4 * effective)) / float(stats.norm.ppf(0.975))) ** 2
     if effective < FEWEST_FOR_OWN:
         return even
     own = blocks.sums(slopes * residual)

@@ -21,7 +21,7 @@ NEARLY = 0.99  # of the best agreement: among such peaks of a periodic motion th
 MOST_STEPS = 12
 SMALL_STEP = 0.01
 SCALE_STEPS = 20
-SAME = 4.0  # standard errors within which gyros have one delay
+SAME = 5.0  # standard errors within which gyros have one delay
 SHORTEST_S = 2.0
 SLOW_HZ = 4.0
 
@@ -192,7 +192,8 @@ def _against_the_group(fit: _Fit) -> tuple[np.ndarray, np.ndarray]:
     gyros = len(fit.delay)
     everyone = np.ones(gyros, dtype=bool)
     delay, error = _contrast(fit, everyone)
-    group = np.abs(delay - np.median(delay)) <= SAME * error
+    middle = np.argsort(delay)[(gyros - 1) // 2 : gyros // 2 + 1]
+    group = np.abs(delay - delay[middle].mean()) <= SAME * np.hypot(error, error[middle].mean())
     if group.all() or 2 * group.sum() <= gyros:
         return delay, error
     return _contrast(fit, group)

@@ -1,0 +1,6 @@
+"""Tests of alignment; clock_cases.py, beside this file, is no package."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
