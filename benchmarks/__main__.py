@@ -13,7 +13,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-FAMILIES = ("garch", "dcc", "weights", "kalman", "fusion", "allan", "spectrum", "decode", "imports")
+FAMILIES = ("garch", "dcc", "weights", "kalman", "fusion", "allan", "spectrum", "decode", "logs", "imports")
 ROUNDS, QUICK_ROUNDS = 5, 2
 ONE_THREAD = (
     "VGYRO_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",

@@ -29,7 +29,8 @@ def test_a_quick_run_of_all_contests(tmp_path: Path) -> None:
     record = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     results = {result["name"]: result for result in record["results"]}
     assert set(results) == {
-        "garch", "dcc", "dcc_stderr", "weights", "kalman", "rts", "fusion", "allan", "welch", "decode", "import",
+        "garch", "dcc", "dcc_stderr", "weights", "kalman", "rts", "fusion", "allan", "welch", "decode", "log",
+        "log_read", "import",
     }  # fmt: skip
     for result in results.values():
         assert result["accurate"], result

@@ -88,5 +88,7 @@ def check(data: np.ndarray, size: int, form: LineForm) -> None:
         raise ValueError(f"{form.delimiter!r} cannot stand between cells")
     if any(one.split and (one.kind not in ("date", "day") or form.delimiter != b",") for one in form.fields):
         raise ValueError("only dates and times are split, and only by a comma")
+    if form.delimiter in b"".join(field.label for field in form.fields):
+        raise ValueError("a label holds the delimiter")
     if form.eol in form.lead + form.word + b"".join(field.label for field in form.fields):
         raise ValueError("a word, a label or a lead holds the line's end")

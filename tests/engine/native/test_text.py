@@ -78,6 +78,8 @@ def forms(draw: st.DrawFn) -> LineForm:
     fields = st.builds(Field, st.sampled_from([*KINDS, "number", "number"]), labels, st.sampled_from(text.ORDERS),
                        st.booleans())  # fmt: skip
     delimiter = draw(st.sampled_from([b",", b";", b"\t", b" ", b"|", b":"]))
+    if delimiter == b":":
+        fields = fields.map(lambda one: one._replace(label=b""))
     decimal = draw(st.sampled_from([b".", b","])) if delimiter != b"," else b"."
     # Only dates are split, and only by a comma.
     cells = [
@@ -281,9 +283,10 @@ def test_it_stops_where_there_is_no_room() -> None:
         (LineForm((NUMBER,), b",", b","), b"1\n"),
         (LineForm((NUMBER,), b"5"), b"1\n"),
         (LineForm((NUMBER,), lead=b"\n"), b"1\n"),
+        (LineForm((Field("number", b"gx:"),), b":"), b"1\n"),
     ],
 )
 def test_what_no_kernel_may_be_given(form: LineForm, lines: bytes) -> None:
     for parser in (Native, Reference):
-        with pytest.raises(ValueError, match=r"whole lines|distinct|between|line's end"):
+        with pytest.raises(ValueError, match=r"whole lines|distinct|between|line's end|label holds"):
             parse(parser, lines, form)

@@ -10,9 +10,9 @@ cdef extern from "text.h":
         const uint8_t *label
         size_t label_size
         void *out
-        int kind, order, split
+        int kind, order, split, decimals
     ctypedef struct text_form:
-        const text_field *fields
+        text_field *fields
         size_t count
         const uint8_t *word
         const uint8_t *lead
@@ -52,7 +52,7 @@ cdef class Form:
         for k in range(count):
             self.fields[k].kind, self.fields[k].order, self.fields[k].split, label = fields[k]
             self.fields[k].label, self.fields[k].label_size = label, len(label)
-            self.fields[k].out = NULL
+            self.fields[k].out, self.fields[k].decimals = NULL, 0
         self.form.fields, self.form.count = self.fields, count
         self.form.word, self.form.word_size = word, len(word)
         self.form.lead, self.form.lead_size = lead, len(lead)

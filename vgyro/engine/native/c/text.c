@@ -133,15 +133,15 @@ static int text_careful(text_line *line, const text_form *form, size_t k, const 
 }
 
 /* A plain number at p, perhaps after a label and in quotes. Returns where its cell ends; NULL if it needs care. */
-VG_INLINE const uint8_t *text_quick(const text_line *line, const text_field *field, const uint8_t *p, int64_t row) {
+VG_INLINE const uint8_t *text_quick(const text_line *line, text_field *field, const uint8_t *p, int64_t row) {
     p += *p == ' ';
     for (size_t k = 0; k < field->label_size; k++)
         if (*p++ != field->label[k]) return NULL;
     const int quote = *p == '"';
-    p = text_plain(p + quote, line->decimal, (double *)field->out + row);
+    p = text_plain(p + quote, line->decimal, (double *)field->out + row, &field->decimals);
     if (p == NULL || (quote && *p != '"')) return NULL;
     p += quote;
-    p += *p == '\r' && p[1] == line->eol;
+    p += *p == '\r' && line->eol != '\r' && p[1] == line->eol;
     return *p == line->delimiter || *p == line->end ? p : NULL;
 }
 
@@ -166,7 +166,7 @@ VG_INLINE int text_row(text_line *line, const text_form *form, const uint8_t *da
     /* A pointer of its own stays in a register. */
     const uint8_t *p = line->p;
     for (size_t k = 0; k < count; k++) {
-        const text_field *field = &form->fields[k];
+        text_field *field = &form->fields[k];
         const uint8_t *quick = NULL;
         *at = (int64_t)k;
         line->p = p;

@@ -21,12 +21,13 @@ enum { TEXT_CELL = 1, TEXT_FEW, TEXT_MANY, TEXT_QUOTE, TEXT_LABEL, TEXT_LEAD, TE
 /* label : what stands before the value in the cell, such as "gx:"
    split : of a date: its fraction of a second is in the next cell, for the delimiter is its decimal sign, too
    out   : double [room] of numbers, int64 [room] of integers (null: TEXT_NULL) and of stamps (ns),
-           int64 [room][2] of words: offset and size */
+           int64 [room][2] of words: offset and size
+   decimals : the reader's own: how many the last number had, 0 at first */
 typedef struct {
     const uint8_t *label;
     size_t label_size;
     void *out;
-    int kind, order, split;
+    int kind, order, split, decimals;
 } text_field;
 
 /* word      : with which the lines of the table begin; other lines that begin with a letter or a sign are not its own
@@ -34,7 +35,7 @@ typedef struct {
    delimiter : ' ' stands for any blanks;  eol : '\n', or '\r' where there is no other
    checksum  : lines end with '*' and the XOR of all bytes between '$' and it, two hexadecimal digits */
 typedef struct {
-    const text_field *fields;
+    text_field *fields;
     size_t count;
     const uint8_t *word, *lead;
     size_t word_size, lead_size;

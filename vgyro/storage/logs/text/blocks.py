@@ -55,8 +55,11 @@ class Lines:
         for piece in text_blocks(self._file, self._encoding, self._size):
             self.content_bytes += len(piece)
             fresh = np.frombuffer(piece, dtype=np.uint8)
-            if self._skipping and (fresh := self._after_long(piece, fresh)) is None:
-                continue
+            if self._skipping:
+                rest = self._after_long(piece, fresh)
+                if rest is None:
+                    continue
+                fresh = rest
             self._room[self._held : self._held + len(fresh)] = fresh
             size = self._held + len(fresh)
             whole = self._whole(size)

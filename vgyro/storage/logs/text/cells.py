@@ -8,13 +8,26 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from vgyro.engine.reference.text import date, hexadecimal, integer, number, time_of_day
+from vgyro.engine.reference.text import date, hexadecimal, integer, time_of_day
 from vgyro.engine.text import MISSING, Cell, Order
 
 ENOUGH = 0.75
 """Share of a column's cells that tells what it is; the others are damage."""
 EXACT_DIGITS = 15
 """Digits that a double holds for sure; longer integers are kept as integers."""
+NUMBERS = {
+    sign: re.compile(
+        rf"[+-]?(?:(?:[0-9]+(?:{re.escape(sign)}[0-9]*)?|{re.escape(sign)}[0-9]+)(?:[eE][+-]?[0-9]+)?"
+        r"|(?i:inf|infinity)|0[xX][0-9A-Fa-f]{1,16})"
+    )
+    for sign in ".,"
+}
+"""What reference.text.number takes, by the sign before the decimals; quicker where only the form counts."""
+STAMP = re.compile(
+    r"(?:\d{4}([-/.])\d{1,2}\1\d{1,2}|\d{8}(?=T)|\d{1,2}[-/. ](?:\d{1,2}|[A-Za-z]{3})[-/. ]\d{2,4})(?:[T_ ]+\d.*)?"
+    r"|\d{1,2}:\d\d:\d\d.*"
+)
+"""What looks like a date, a time of day, or both."""
 WORD = re.compile(r"[$!@#>\[]?[^\W\d][\w.\-/\]]*:?")
 LABEL = re.compile(r"(\"?[^\W\d][^:=,;\"]{0,60}\"?\s*[:=])\s*(\S.*)?")
 
@@ -39,12 +52,17 @@ def split(line: str, delimiter: str) -> list[str]:
 
 def is_word(cell: str) -> bool:
     """Is a cell a word, which could tell the kind of its line?"""
-    return bool(WORD.fullmatch(cell)) and not missing(cell) and number(cell, ".") is None
+    return bool(WORD.fullmatch(cell)) and not missing(cell) and not is_number(cell, ".")
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Is a cell a number?"""
+    return NUMBERS[decimal].fullmatch(cell) is not None
 
 
 def is_value(cell: str, decimal: str) -> bool:
-    """Is a cell a number or a stamp?"""
-    return number(cell, decimal) is not None or stamp_of([cell]) is not None
+    """Is a cell a number, or does it look like a stamp?"""
+    return is_number(cell, decimal) or STAMP.fullmatch(cell) is not None
 
 
 class Stamp(NamedTuple):
@@ -58,7 +76,7 @@ class Stamp(NamedTuple):
 
 def stamp_of(cells: Sequence[str]) -> Stamp | None:
     """What stamps the cells are, none of them missing; None if they are none."""
-    if not cells or not re.search(r"\d[-/.:T ]\w", cells[0]):
+    if not cells or not _most(cells[:20], lambda cell: STAMP.fullmatch(cell) is not None):
         return None
     if all(":" in cell for cell in cells) and _most(cells, lambda cell: time_of_day(cell, "") is not None):
         return Stamp("day")
@@ -90,26 +108,22 @@ def kind_of(cells: Sequence[str], decimal: str) -> tuple[Cell, Stamp | None]:
         return "number", None
     if (stamp := stamp_of(there)) is not None:
         return stamp.kind, stamp
-    if _hexadecimal(there):
+    numbers = sum(is_number(cell, decimal) for cell in there)
+    if numbers < len(there) and _hexadecimal(there):
         return "hex", None
-    if _most(there, lambda cell: number(cell, decimal) is not None):
+    if numbers >= ENOUGH * len(there):
         long = any(len(cell.lstrip("+-").lstrip("0")) > EXACT_DIGITS for cell in there if integer(cell) is not None)
         return ("integer" if long and all(integer(cell) is not None for cell in there) else "number"), None
     return "words", None
 
 
 def _hexadecimal(cells: Sequence[str]) -> bool:
-    """Bare hexadecimal numbers: all of one width, with digits and letters, and not all of them decimal."""
+    """Bare hexadecimal numbers: all of one width, with digits and letters."""
     width = Counter(map(len, cells)).most_common(1)[0][0]
     if width < 2 or not _most(cells, lambda cell: len(cell) == width and hexadecimal(cell) is not None):
         return False
     text = "".join(cells).lower()
-    return (
-        not text.startswith("0x")
-        and any(one in "abcdef" for one in text)
-        and any(one.isdigit() for one in text)
-        and not all(number(cell, ".") is not None for cell in cells)
-    )
+    return not text.startswith("0x") and any(one in "abcdef" for one in text) and any(one.isdigit() for one in text)
 
 
 class Labelled(NamedTuple):

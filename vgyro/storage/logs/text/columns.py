@@ -12,7 +12,7 @@ from typing import NamedTuple
 from vgyro.engine.text import Cell, Field, LineForm
 from vgyro.storage.logs.table import Kind, LogColumn, LogTable
 from vgyro.storage.logs.text.cells import Stamp, is_value, kind_of, labelled, missing, name_of, split
-from vgyro.storage.logs.text.delimiter import Signs
+from vgyro.storage.logs.text.delimiter import Signs, holds_value
 from vgyro.storage.logs.text.header import header_of, named
 
 KINDS: dict[Cell, Kind] = {
@@ -60,9 +60,10 @@ def most_common(numbers: Sequence[int]) -> int:
     return max(counts, key=lambda one: (counts[one], one))
 
 
-def typed(rows: Sequence[Sequence[str]], signs: Signs, merged: int | None = None) -> Typed:
+def typed(rows: Sequence[Sequence[str]], signs: Signs, codec: str, merged: int | None = None) -> Typed:
     """What the cells of rows of equal length are.
 
+    codec  : of the file's bytes
     merged : cell whose fraction of a second is in the next one
     """
     columns = [list(column) for column in zip(*rows, strict=True)]
@@ -75,16 +76,19 @@ def typed(rows: Sequence[Sequence[str]], signs: Signs, merged: int | None = None
     name = ""
     for place, cells in enumerate(columns):
         if place + 1 < len(columns) and (literal := _literal(cells)):
-            fields.append(Field("literal", literal.encode()))
+            fields.append(Field("literal", literal.encode(codec, "replace")))
             names.append("")
             name = name_of(literal)
             continue
         label = labelled(cells)
+        if label and signs.delimiter in label.label:
+            # In quotes it may; the kernel would end the cell there.
+            label = None
         kind, stamp = kind_of(label.values if label else cells, signs.decimal)
         if stamp:
             stamps[place] = stamp
         order = stamp.order if stamp else "ymd"
-        fields.append(Field(kind, label.label.encode() if label else b"", order, place == merged))
+        fields.append(Field(kind, label.label.encode(codec, "replace") if label else b"", order, place == merged))
         names.append(name_of(label.label) if label else name)
         name = ""
     parts = _parts(fields, stamps)
@@ -121,13 +125,21 @@ def fraction_at(rows: Sequence[Sequence[str]], signs: Signs) -> int | None:
     return None
 
 
-def fits(cells: Sequence[str], found: Typed, decimal: str) -> bool:
+def rich(rows: Sequence[Sequence[str]], decimal: str) -> list[Sequence[str]]:
+    """The rows that hold about as many values as any: headers hold none."""
+    counts = [sum(not missing(cell) and holds_value(cell, decimal) for cell in row) for row in rows]
+    most = max(counts, default=0)
+    return [row for row, count in zip(rows, counts, strict=True) if count > 0 and count >= FITTING * most]
+
+
+def fits(cells: Sequence[str], found: Typed, decimal: str, codec: str) -> bool:
     """Could a line with these cells be a row? Most of its values must be values."""
     values = [place for place, field in enumerate(found.fields) if field.kind in VALUES and place < len(cells)]
     right = 0
     for place in values:
         cell, field = cells[place], found.fields[place]
-        bare = cell[len(field.label) :].strip() if cell.startswith(field.label.decode()) else "?"
+        label = field.label.decode(codec)
+        bare = cell[len(label) :].strip() if cell.startswith(label) else "?"
         right += not missing(bare) and (is_value(bare, decimal) or kind_of([bare], decimal)[0] in VALUES)
         right += field.kind == "hex" and bool(re.fullmatch("[0-9A-Fa-f]+", bare)) and not is_value(bare, decimal)
     empty = sum(missing(cells[place]) for place in values)

@@ -50,7 +50,7 @@ def _score(lines: Sequence[str], delimiter: str, decimal: str) -> float:
         several += len(found) > 1
         rest = found[bool(kind) :]
         cells += len(rest)
-        good += sum(_fits(cell, decimal) for cell in rest)
+        good += sum(holds_value(cell, decimal) for cell in rest)
     if not lines or not cells:
         return 0.0
     regular = sum(count.most_common(1)[0][1] for count in counts.values()) / len(lines)
@@ -60,7 +60,8 @@ def _score(lines: Sequence[str], delimiter: str, decimal: str) -> float:
     return regular * (0.5 + 0.5 * several / len(lines)) * good / cells
 
 
-def _fits(cell: str, decimal: str) -> bool:
+def holds_value(cell: str, decimal: str) -> bool:
+    """Does a cell hold a number or a stamp, a label with one, a label alone, or nothing?"""
     if missing(cell) or is_value(cell, decimal):
         return True
     label = LABEL.fullmatch(cell)

@@ -13,6 +13,7 @@ from vgyro.log import TextForm
 from vgyro.storage.logs.text import columns as of
 from vgyro.storage.logs.text.cells import is_value, is_word, kind_of, missing, stamp_of
 from vgyro.storage.logs.text.columns import Naming, TableForm, Typed
+from vgyro.storage.logs.text.damage import shown
 from vgyro.storage.logs.text.delimiter import Signs, find_signs
 from vgyro.storage.logs.text.head import (
     Head,
@@ -30,7 +31,8 @@ WORDS = 0.8
 """Share of lines that begin with a word, from which on the word tells the kind of the line."""
 LEAST_FIT = 0.5
 """Share of the head's lines that must be rows: with fewer, the form is not understood."""
-SHOWN = 60
+FEW_LINES = 20
+FEW = 100
 SWAPPED = "\x1f"
 """What several signs between columns become."""
 
@@ -71,8 +73,11 @@ class Finder:
             texts = [rest for line in texts if (rest := lead.strip(line))]
         checked = lead is None and has_checksums([line for line in texts if "*" in line])
         bare = [without_checksum(line) if checked else line for line in texts]
-        signs = find_signs(bare, self._delimiter(), self.given.decimal)
-        if lead is None and (words := self._words(bare, signs)):
+        signs = find_signs(sample(bare, FEW), self._delimiter(), self.given.decimal)
+        if lead is None and self._words(bare, signs):
+            # Kinds that are rare may be missing among the lines that were looked at.
+            first = [line.split(None if signs.delimiter == " " else signs.delimiter, 1)[0].strip() for _, line in body]
+            words = [word for word in dict.fromkeys(first) if is_word(word)][:MOST_KINDS]
             return self._kinds(body, words, signs, checked)
         return self._single(body, lead, signs, checked and all("*" in line for line in texts[1:]))
 
@@ -82,12 +87,15 @@ class Finder:
         marked = [line for line in texts if ":" in line or "=" in line]
         if len(marked) < WORDS * len(texts) or find_lead(texts) is not None:
             return None
-        return label_form(texts, find_signs(texts, self._delimiter(), self.given.decimal))
+        return label_form(texts, find_signs(sample(texts, FEW), self._delimiter(), self.given.decimal))
 
     def _delimiter(self) -> str | None:
         given = self.given.delimiter
         if given is None:
             return None
+        if given.strip() == self.given.decimal:
+            what = f"{given!r} cannot be both the delimiter and the decimal sign"
+            raise DataError(what, str(self.path), "correct `delimiter` or `decimal` in the manifest")
         bare = given.strip(" ") or " "
         if len(bare.encode()) > 1:
             return SWAPPED
@@ -110,53 +118,58 @@ class Finder:
 
     # --- several kinds of lines
 
-    def _words(self, lines: Sequence[str], signs: Signs) -> list[str]:
-        """The first words of the lines, if they tell their kinds; none if they do not."""
+    def _words(self, lines: Sequence[str], signs: Signs) -> bool:
+        """Do the first words of the lines tell their kinds?"""
         cells = [of.cut(line, signs) for line in lines]
         words = [row[0] for row in cells if row and is_word(row[0])]
         distinct = list(dict.fromkeys(words))
         if len(words) < WORDS * len(lines) or len(distinct) > MOST_KINDS or self.given.header:
-            return []
+            return False
         if distinct[0].endswith((":", "=")):
             # Labels: "gx: 0.1 gy: 0.2".
             pairs = sum(len(row) > 2 and row[2].endswith(row[0][-1]) for row in cells)
             if pairs > 0.5 * len(cells) or all(len(row) <= 2 for row in cells):
-                return []
+                return False
         first = cells[0]
         others = [row[0] for row in cells[1:] if row and row != first]
         header = first[0] not in others and not any(is_value(cell, signs.decimal) for cell in first)
-        if header and len(first) == of.most_common([len(row) for row in cells]) and self.given.header is not False:
-            # A header with names for all columns: the words are values of the first one.
-            return []
-        return distinct
+        # A header with names for all columns: the words are values of the first one.
+        names_all = header and len(first) == of.most_common([len(row) for row in cells])
+        return not names_all or self.given.header is False
 
     def _kinds(self, body: Sequence[tuple[int, str]], words: Sequence[str], signs: Signs, checked: bool) -> Form:
-        groups: dict[str, list[list[str]]] = defaultdict(list)
-        sums: dict[str, list[bool]] = defaultdict(list)
+        groups: dict[str, list[tuple[str, list[str]]]] = defaultdict(list)
         for _, line in body:
             cells = of.cut(without_checksum(line) if checked else line, signs)
             if cells and cells[0] in words:
-                groups[cells[0]].append(cells[1:])
-                sums[cells[0]].append(line != without_checksum(line))
-        tables = []
+                groups[cells[0]].append((line, cells[1:]))
+        # A kind that is seen once is likelier the rest of a line.
+        groups = {word: rows for word, rows in groups.items() if len(rows) > 1 or len(body) < FEW_LINES}
+        tables, known = [], set()
         for word, rows in groups.items():
-            summed = checked and sum(sums[word]) > 0.5 * len(rows)
-            line = replace(self._line(signs, None, summed), word=word.encode(self.head.codec, "replace"))
-            if (table := self._kind(word.rstrip(":="), rows, signs, line)) is not None:
+            summed = checked and sum(line != without_checksum(line) for line, _ in rows) > 0.5 * len(rows)
+            form = replace(self._line(signs, None, summed), word=word.encode(self.head.codec, "replace"))
+            header = None
+            if len(rows) > 1 and not any(is_value(cell, signs.decimal) for cell in rows[0][1]):
+                # Names of this kind's columns, perhaps again when the logger starts again.
+                header = rows[0][1]
+                known.add(rows[0][0])
+            cells_of = [cells for _, cells in rows if cells != header]
+            if cells_of and (table := self._kind(word.rstrip(":="), cells_of, header, signs, form)) is not None:
                 tables.append(table)
         if not tables:
             raise self._unread(body[0], "numbers behind the first word")
-        return Form(tuple(tables), self.given.skip + 1)
+        return Form(tuple(tables), self.given.skip + 1, frozenset(known))
 
-    def _kind(self, name: str, rows: list[list[str]], signs: Signs, line: LineForm) -> TableForm | None:
+    def _kind(
+        self, name: str, rows: list[list[str]], header: list[str] | None, signs: Signs, line: LineForm
+    ) -> TableForm | None:
         """The table of one kind of line; None if it holds no numbers."""
         count = of.most_common([len(row) for row in rows])
-        full = [row for row in rows if len(row) == count]
         if not count:
             return None
-        header = full[0] if not any(is_value(cell, signs.decimal) for cell in full[0]) and len(full) > 1 else None
-        full = of.trimmed(_spread([row for row in full if row != header]), [], signs)
-        found = of.typed(full, signs)
+        full = of.trimmed(sample([row for row in rows if len(row) == count]), [], signs)
+        found = of.typed(full, signs, self.head.codec)
         if not found.numbers:
             return None
         given = of.plain_naming(found)
@@ -178,19 +191,30 @@ class Finder:
             header = None
         count = of.most_common([len(row) for _, row in cells])
         full = [row for _, row in cells if len(row) == count]
-        rough = of.typed(_spread(full), signs)
-        start = next((number for number, row in cells if len(row) == count and of.fits(row, rough, signs.decimal)), 0)
+        kept = of.rich(sample(full), signs.decimal)
+        if not kept:
+            raise self._unread(own[0] if own else body[0], "a row of numbers")
+        rough = of.typed(kept, signs, self.head.codec)
+        start = next(
+            (
+                number
+                for number, row in cells
+                if len(row) == count and of.fits(row, rough, signs.decimal, self.head.codec)
+            ),
+            0,
+        )
         if not rough.numbers or not start:
-            raise self._unread(own[0] if own else body[0], "a row of numbers", rough)
+            raise self._unread(own[0] if own else body[0], "a row of numbers")
         before = [] if self.given.header is False else self._before(lead, start)
-        rows = [row for number, row in cells if number >= start and len(row) == count]
-        good = [row for row in rows if of.fits(row, rough, signs.decimal)]
-        behind = sum(number >= start for number, _ in cells)
-        if len(good) < LEAST_FIT * behind:
-            wrong = next(text for number, text in own if number > start and of.cut(text, signs) not in good)
-            number = next(number for number, text in own if number > start and text == wrong)
-            raise self._unread((number, wrong), f"{count} cells as in line {start}", rough)
-        found, naming = self._named(_spread(good), before, signs, header)
+        behind = sample([row for number, row in cells if number >= start])
+        good = [row for row in behind if len(row) == count and of.fits(row, rough, signs.decimal, self.head.codec)]
+        if len(good) < LEAST_FIT * len(behind):
+            number = next(
+                number for number, row in cells
+                if number > start and not (len(row) == count and of.fits(row, rough, signs.decimal, self.head.codec))
+            )  # fmt: skip
+            raise self._unread((number, self.head.lines[number - 1]), f"{count} cells as in line {start}")
+        found, naming = self._named(sample(good), before, signs, header)
         found, naming = _with_lead(found, naming, lead, [line for number, line in body if number >= start])
         if self.given.header is False:
             start = min(number for number, _ in cells)
@@ -215,11 +239,11 @@ class Finder:
         else:
             width = max((place for place, cell in enumerate(header[1], start=1) if cell), default=0)
             rows = [row[:width] if not any(row[width:]) else row for row in rows]
-        found = of.typed(rows, signs)
+        found = of.typed(rows, signs, self.head.codec)
         naming = of.naming(before, found, signs)
         merged = of.fraction_at(rows, signs) if naming is None else None
         if merged is not None:
-            found = of.typed(rows, signs, merged)
+            found = of.typed(rows, signs, self.head.codec, merged)
             naming = of.naming(before, found, signs)
         if header is not None:
             naming = self._given_header(header, found)
@@ -236,8 +260,9 @@ class Finder:
         if len(cells) == len(found.fields):
             names = [" ".join(cells[cell] for cell in part) for part in found.parts]
             return Naming(names, [""] * len(names), True)
-        if (names := names_in(" ".join(cells), " ", len(found.parts))) is not None:
-            return Naming(names, [""] * len(names), True)
+        others = names_in(" ".join(cells), " ", len(found.parts))
+        if others is not None:
+            return Naming(others, [""] * len(others), True)
         raise DataError(
             f"the header holds {len(cells)} names, the rows {len(found.fields)} cells", f"{self.path}, line {number}",
             "correct `header`, `delimiter` or `skip` in the manifest",
@@ -252,19 +277,14 @@ class Finder:
             )  # fmt: skip
         return Naming(list(names), [""] * len(names), True)
 
-    def _unread(self, line: tuple[int, str], expected: str, found: Typed | None = None) -> DataError:
+    def _unread(self, line: tuple[int, str], expected: str) -> DataError:
         number, text = line
-        shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
-        what = f"holds no table of numbers that is understood: found {shown!r}, expected {expected}"
-        if found is not None and found.numbers and number == 1 and len(self.head.body(0)) == 1:
-            what = f"holds only a header: found {shown!r}, expected {expected} after it"
+        what = f"holds no table of numbers that is understood: found {shown(text)!r}, expected {expected}"
+        body = self.head.body(self.given.skip)
+        if len(body) <= 2 and not any(one.isdigit() for _, one_line in body for one in one_line.split()):
+            what = f"holds only a header: found {shown(text)!r}, expected rows of numbers behind it"
         remedy = "set `delimiter`, `decimal`, `header` or `skip` under `text` in the manifest"
         return DataError(what, f"{self.path}, line {number}", remedy)
-
-
-def _spread(rows: list[list[str]]) -> list[list[str]]:
-    """Some of the rows; those that are longer than exact numbers are among the first."""
-    return rows if len(rows) <= 400 else [rows[(place * len(rows)) // 400] for place in range(400)]
 
 
 def _with_lead(found: Typed, naming: Naming, lead: Lead | None, lines: Sequence[str]) -> tuple[Typed, Naming]:

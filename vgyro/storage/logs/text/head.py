@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from vgyro.errors import DataError
 from vgyro.log import TextForm
@@ -21,6 +22,8 @@ STAMP = r"(?:\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}[T ]+)?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?
 LEAD = re.compile(rf"(\[?)({STAMP})(\]\s*(?:-+>|=>)?\s*|\s*(?:-+>|=>)\s*|\s+>\s+)")
 CHECKSUM = re.compile(r"\*[0-9A-Fa-f]{2}$")
 MOST = 0.8
+GOLDEN = 0.6180339887498949
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -97,11 +100,14 @@ def _take(source: SourceFile, encoding: Encoding, size: int) -> tuple[bytes, boo
     return bytes(taken), True
 
 
-def sample(lines: Sequence[str]) -> list[str]:
-    """Some of the lines, evenly spread: the first ones may be special."""
-    if len(lines) <= SAMPLE:
-        return list(lines)
-    return [lines[(place * len(lines)) // SAMPLE] for place in range(SAMPLE)]
+def sample(items: Sequence[T], most: int = SAMPLE) -> list[T]:
+    """Some of the items, in their order, the first among them; from all over, for the first ones may be special.
+
+    The golden ratio's multiples are even, but in step with nothing that comes again and again.
+    """
+    if len(items) <= most:
+        return list(items)
+    return [items[place] for place in sorted({int(len(items) * (k * GOLDEN % 1)) for k in range(most)})]
 
 
 @dataclass(frozen=True)

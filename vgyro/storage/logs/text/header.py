@@ -18,7 +18,7 @@ ENDINGS = {
     "us": "us", "ns": "ns", "degc": "degC", "m_s2": "m/s2", "mps2": "m/s2", "mg": "mg", "ut": "uT", "hpa": "hPa",
 }  # fmt: skip
 """Units at a name's end, behind a blank, "_", "." or "-"; and as they are written elsewhere."""
-ENDING = re.compile(rf".*[a-z0-9)][\s_.\-]+({'|'.join(sorted(ENDINGS, key=len, reverse=True))})", re.IGNORECASE)
+ENDING = re.compile(rf".*?[a-z0-9)][\s_.\-]+({'|'.join(sorted(ENDINGS, key=len, reverse=True))})", re.IGNORECASE)
 UNITS = {
     "s", "sec", "ms", "us", "µs", "μs", "ns", "min", "h", "deg/s", "°/s", "º/s", "dps", "rad/s", "rps", "mdps", "deg/h",
     "°/h", "g", "mg", "m/s2", "m/s^2", "m/s²", "c", "°c", "degc", "k", "hz", "v", "mv", "lsb", "counts", "count", "raw",
