@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,7 +14,8 @@ from vgyro.cli.manifest_text import ArrayDraft, LogDraft
 from vgyro.errors import DataError, UsageError
 from vgyro.log import Log
 from vgyro.storage.logs.families import open_log
-from vgyro.storage.logs.roles import GyroGuess, Roles, bare_name, roles_of
+from vgyro.storage.logs.names import bare_name
+from vgyro.storage.logs.roles import GyroGuess, Roles, roles_of
 from vgyro.storage.logs.table import LogFile, LogTable
 
 HEAD_ROWS = 20_000
@@ -42,7 +43,7 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True)
 class Look:
-    """One log: what it holds. unused: tables with gyros that were not taken; rows: of the first source, None: not read"""
+    """One log: what it holds. unused: tables with gyros that were not taken."""
 
     path: Path
     opened: LogFile
@@ -53,7 +54,9 @@ class Look:
 def look_at(path: Path) -> Look:
     """Open a log and guess the role of every column.  raises : DataError if it is no log, or holds no gyro"""
     opened = open_log(path, Log())
-    found = [(table, roles_of(table.columns, head_of(opened, table), table.name)) for table in opened.tables]
+    found = []
+    for table in opened.tables:
+        found.append((table, roles_of(table.columns, head_of(opened, table), table.name or path.stem)))
     gyros = [(table, roles) for table, roles in found if roles.gyros]
     if not gyros:
         there = "; ".join(_columns(table) for table in opened.tables)
@@ -94,10 +97,8 @@ def _alike(found: Sequence[tuple[LogTable, Roles]]) -> list[tuple[LogTable, Role
 
 def are_one_array(looks: Sequence[Look], rows: Sequence[int]) -> bool:
     """Do several files hold one array, a file a gyro? One gyro an axis each, and about as many rows in each."""
-    single = all(
-        len(look.sources) == 1 and len({gyro.axis for gyro in look.sources[0].roles.gyros}) == len(look.sources[0].roles.gyros)
-        for look in looks
-    )
+    axes = [[gyro.axis for gyro in look.sources[0].roles.gyros] for look in looks]
+    single = all(len(look.sources) == 1 for look in looks) and all(len(set(one)) == len(one) for one in axes)
     same = len({tuple(gyro.column for gyro in look.sources[0].roles.gyros) for look in looks}) == 1
     return len(looks) > 1 and single and same and max(rows) - min(rows) <= SAME_LENGTH * max(rows)
 
@@ -147,9 +148,7 @@ def _gyro(name: str, guess: GyroGuess, choices: Choices, path: Path, placed: boo
     return entry
 
 
-def _place(
-    look: Look, source: Source, sources: Sequence[tuple[Look, Source]], several_files: bool
-) -> dict[str, Any]:
+def _place(look: Look, source: Source, sources: Sequence[tuple[Look, Source]], several_files: bool) -> dict[str, Any]:
     """What tells the columns of a source from those of the others; empty where there is one source."""
     place: dict[str, Any] = {}
     if len({one.table.name for _, one in sources}) > 1:
