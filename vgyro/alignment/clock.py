@@ -29,6 +29,7 @@ from vgyro.units import parts_per_million
 FOUND, NO_COMMON_MOTION, AMBIGUOUS, TOO_SHORT = "found", "no common motion", "ambiguous", "too short"
 STATUSES = (FOUND, NO_COMMON_MOTION, AMBIGUOUS, TOO_SHORT)
 FALSE_ALARM = 1e-3
+LEAST_CORRELATION = 0.7  # in motion; below it the motion is as small as the noise, or only alike
 MOST_DRIFT_PPM = 1000.0
 CUTOFFS_HZ = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 SEARCH_HZ = 4.0
@@ -117,7 +118,7 @@ def relative_clock(
     most_offset_s  : the most by which one stream begins before or after the other; less is faster
     most_drift_ppm : the most by which the clocks' rates differ
     false_alarm    : chance at which streams with no motion in common are taken to have one; above it the status is
-                     "no common motion"
+                     "no common motion", as it is below a correlation of 0.7 in motion
     Both are low-passed; peaks of their correlation over a grid of drifts are candidates; each is refined by
     least squares of other - scale · reference with a level and slope per ten seconds (see `fit_line`); the best is
     fitted again in bands of 1 … 32 Hz, and the one with the smallest standard error is kept. Levels, scale factors and
@@ -135,7 +136,11 @@ def relative_clock(
     found = search(*bands, most_offset_s, most_drift)
     fits = grow(*bands, found.candidates, most_drift)
     chances = [_chance_log10(fit, found.tried) for fit in fits]
-    good = [fit for fit, chance in zip(fits, chances, strict=True) if chance < math.log10(false_alarm)]
+    good = [
+        fit
+        for fit, chance in zip(fits, chances, strict=True)
+        if chance < math.log10(false_alarm) and abs(fit.correlation) >= LEAST_CORRELATION
+    ]
     if not good:
         best = max(fits, key=score, default=None)
         evidence = Evidence() if best is None else _evidence(best, min(chances), SEARCH_HZ, None)

@@ -107,7 +107,7 @@ def _scores(
         np.concatenate((v[1 - len(x) :], v[: len(y)])) if len(x) > 1 else v[: len(y)]
         for v in (cross, x_power, y_power, overlap)
     )
-    tiny = 1e-9 * max(float(x_power.max(initial=0)), float(y_power.max(initial=0)), 1e-300)
+    tiny = 1e-9 * max(float(x_power.max(initial=0)), float(y_power.max(initial=0)), 1e-100)
     square = np.clip(cross**2 / np.maximum(x_power * y_power, tiny**2), 0.0, 1 - 1e-9)
     return lags, np.where(overlap * step >= LEAST_OVERLAP_S, -overlap * np.log1p(-square), 0.0)
 
