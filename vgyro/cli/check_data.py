@@ -25,6 +25,7 @@ from vgyro.calibration.suspicions import (
 from vgyro.config import CalibrationOptions, IntegrityOptions, RestOptions
 from vgyro.dataset import AT_REST, FileReference, Manifest, PlateauReference, Recording, values_of
 from vgyro.errors import VgyroError
+from vgyro.log import LogArray
 from vgyro.storage.decode import open_recording
 from vgyro.storage.diagnose import diagnose
 from vgyro.storage.inputs import data_files
@@ -86,9 +87,8 @@ def _of_recording(
     key: str, recording: Recording, manifest: Manifest, board: Board, folder: Path, boards: Path
 ) -> Iterator[Finding]:
     paths = data_files(manifest, recording.name, folder)
-    array = None if manifest.array is None else manifest.array
     try:
-        head = read_head(paths, recording, board, boards, array)
+        head = read_head(paths, recording, board, boards, manifest.array)
         advice = (
             []
             if recording.log or not isinstance(board.frame, BinaryFrame)
@@ -113,10 +113,11 @@ def _of_recording(
         yield from _table(key, head, recording, board, folder, manifest)
 
 
-def read_head(paths: list[Path], recording: Recording, board: Board, boards: Path, array: object = None) -> Head:
+def read_head(
+    paths: list[Path], recording: Recording, board: Board, boards: Path, array: LogArray | None = None
+) -> Head:
     """Read a recording, up to MOST_VALUES.  raises : DataError, ConfigError"""
-    given = {} if array is None else {"array": array}
-    reader = open_recording(paths, recording, board, IntegrityOptions(), boards=boards, **given)  # type: ignore[arg-type]
+    reader = open_recording(paths, recording, board, IntegrityOptions(), boards=boards, array=array)
     most = max(FEWEST_ROWS, MOST_VALUES // len(board.gyros))
     columns, times, rows = [], [], 0
     fields = [gyro.field for gyro in board.gyros]
