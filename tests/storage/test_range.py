@@ -11,7 +11,8 @@ from vgyro.storage.frames import channel_watches, gyro_rails
 from vgyro.storage.integrity import Ledger, Refused
 from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
 
-SAMPLES = 1000
+VALUES = 1000
+SAMPLES = VALUES + 1  # the last one has no value
 
 
 def board_of(gyros: int, adc: tuple[int, int] | None = None, **gyro: object) -> Board:
@@ -43,7 +44,7 @@ def record_of(board: Board, columns: list[np.ndarray], options: IntegrityOptions
 
 
 def clipped(share: float) -> np.ndarray:
-    """Noise, a share of which is beyond the range; one value has no number."""
+    """Noise, a share of whose values is beyond the range."""
     values = np.random.default_rng(1).normal(0, 5, SAMPLES)
     values[: math.floor(share * (SAMPLES - 1))] = 40_000.0
     values[-1] = np.nan
