@@ -69,7 +69,9 @@ def test_a_case_comes_out_as_it_is(read, name):
         assert len(record.gaps) == expected["gaps"]
     if "duration_s" in expected:
         # From the first sample to the last: the record counts one period more.
-        assert found.frames.time[-1] - found.frames.time[0] == pytest.approx(expected["duration_s"], abs=0.5 / record.rate_hz)
+        assert found.frames.time[-1] - found.frames.time[0] == pytest.approx(
+            expected["duration_s"], abs=0.5 / record.rate_hz
+        )
     for key in ("mean", "mean_deg_s", "mean_counts"):
         if key in expected:
             assert found.means == pytest.approx(expected[key], abs=MEANS)

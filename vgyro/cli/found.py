@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -23,6 +24,7 @@ from vgyro.storage.decode import open_recording
 from vgyro.storage.frames import gather
 from vgyro.storage.inputs import read_board
 from vgyro.storage.integrity import Integrity
+from vgyro.storage.logs.names import bare_name
 
 LARGEST_LOOKED_AT = 400 << 20
 MOVES = 0.02
@@ -53,7 +55,8 @@ def find(options: argparse.Namespace, folder: Path, manifest: Path, names: Seque
 
     raises : DataError, UsageError, ConfigError
     """
-    dumps = [is_dump(path, options.boards) for path in options.files]
+    named = read_board(options.board, boards=options.boards) if options.board else None
+    dumps = [is_dump(path, options.boards, named) for path in options.files]
     if all(dumps):
         return _dumps(options, folder, manifest, names)
     if any(dumps):
@@ -175,7 +178,8 @@ def _must_be_alike(looks: Sequence[Look], together: bool) -> None:
 
 
 def _common_name(names: Sequence[str]) -> str:
-    return os.path.commonprefix(list(names)).strip("-_0123456789") or "array"
+    same = itertools.takewhile(lambda signs: len(set(signs)) == 1, zip(*names, strict=False))
+    return "".join(signs[0] for signs in same).strip("-_0123456789") or "array"
 
 
 def _board_of(array: ArrayDraft, drafts: Sequence[RecordingDraft]) -> Board:
@@ -223,7 +227,7 @@ def _where(array: ArrayDraft, gyro: dict[str, Any]) -> str:
     place = array.places.get(gyro["name"], {"column": gyro.get("column")})
     parts = [f"{key} {place[key]}" for key in ("file", "table") if key in place]
     parts += [f"{column} {value}" for column, value in place.get("where", {}).items()]
-    if place["column"] != gyro["name"]:
+    if gyro["name"] not in (place["column"], bare_name(place["column"])):
         parts.insert(0, f"column {place['column']}")
     return "".join(f", {part}" for part in parts)
 
@@ -241,11 +245,14 @@ def _clock_lines(record: Integrity) -> list[str]:
         if known and known["by"] == "common motion":
             lines.append(
                 f"  joined     {clock['stream']} begins {known['offset_s']:+.4f} s after {known['to']}"
-                f" ({known['offset_low_s']:.4f} to {known['offset_high_s']:.4f}), its clock is {known['drift_ppm']:+.1f} ppm"
-                f" fast ({known['drift_low_ppm']:.1f} to {known['drift_high_ppm']:.1f}): by the motion in common"
+                f" ({known['offset_low_s']:.4f} to {known['offset_high_s']:.4f}), its clock is"
+                f" {known['drift_ppm']:+.1f} ppm fast ({known['drift_low_ppm']:.1f} to"
+                f" {known['drift_high_ppm']:.1f}): by the motion in common"
             )
         elif known:
-            lines.append(f"  joined     {clock['stream']} begins {known['offset_s']:+.6g} s after {known['to']}: by the stamps")
+            lines.append(
+                f"  joined     {clock['stream']} begins {known['offset_s']:+.6g} s after {known['to']}: by the stamps"
+            )
     return lines
 
 
@@ -255,7 +262,9 @@ def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | Non
     if kind is not None:
         draft.kind, draft.why = kind, "as you say"  # type: ignore[assignment]  # the manifest's validation judges it
     if size > LARGEST_LOOKED_AT:
-        draft.why = f"not looked at, for the files are larger than {LARGEST_LOOKED_AT >> 20} MiB: correct it"
+        if kind is None:
+            most = f"{LARGEST_LOOKED_AT >> 20} MiB"
+            draft.why = f"not looked at, for the files are larger than {most}: correct it"
         return [f"  {draft.name}: {size >> 20} MiB, too large to be looked at as a whole here"]
     record, share, stretches = survey(found, draft, folder)
     if kind is None:
@@ -270,7 +279,9 @@ def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | Non
         if draft.log is not None and draft.log.time is not None:
             draft.log.meaning = f"found to be {clock['meaning']}"
             draft.log.time_unit = draft.log.time_unit or clock["unit"]
-    lines += [f"  {'suspect':<10} {text}" for text in record.reasons] + [f"  {'note':<10} {text}" for text in record.warnings]
+    lines += [f"  {'suspect':<10} {text}" for text in record.reasons] + [
+        f"  {'note':<10} {text}" for text in record.warnings
+    ]
     moving = f", moves from {_stretches(stretches)}" if 0 < share < 1 - MOVES else ""
     lines.append(f"  kind       {draft.kind}: {100 * share:.0f} % at rest{moving}")
     return [line for line in lines if line]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -108,14 +109,47 @@ def _array(array: ArrayDraft) -> Iterator[str]:
     for name in ("column", "axis", "sign", "unit", "scale", "bias", "range_deg_s"):
         yield f"#   {name}: {fields[name].description}\n"
     yield "array:\n  gyros:\n"
+    said = ""
     for gyro in array.gyros:
-        yield f"    - {value_text(gyro)}  # {array.why[gyro['name']]}\n"
+        if (why := array.why[gyro["name"]]) != said:
+            yield from _comment(f"unit: {why}", "    ")
+            said = why
+        yield from entry("- ", gyro, "    ")
     yield "  # thermometers: °C = value · scale + offset\n"
     yield f"  temperatures:{'' if array.temperatures else ' []'}\n"
-    yield from (f"    - {value_text(one)}\n" for one in array.temperatures)
+    for one in array.temperatures:
+        yield from entry("- ", one, "    ")
     if array.other:
         yield "  # not used:\n"
-        yield from (f"  #   {column}: {what}\n" for column, what in array.other.items())
+        for column, what in array.other.items():
+            yield from _comment(f"  {column}: {what}", "  ")
+
+
+def entry(key: str, value: object, indent: str) -> Iterator[str]:
+    """Lines of a key, "name: " or "- ", and its value: in one line, or an item a line where that is too wide."""
+    flat = f"{indent}{key}{value_text(value)}\n"
+    if len(flat) <= WIDTH + 1 or not isinstance(value, dict | list) or not value:
+        yield flat
+        return
+    inner = indent + "  "
+    if isinstance(value, dict):
+        inside = [line for name, one in value.items() for line in entry(f"{name}: ", one, inner)]
+    else:
+        inside = [line for one in value for line in entry("- ", one, inner)]
+    if key == "- ":
+        yield f"{indent}- {inside[0].lstrip()}"
+        inside = inside[1:]
+    else:
+        yield f"{indent}{key.rstrip()}\n"
+    yield from inside
+
+
+def _comment(text: str, indent: str) -> Iterator[str]:
+    """A comment, on several lines where it is too wide."""
+    hanging = " " * (len(text) - len(text.lstrip()))
+    width = WIDTH - len(indent) - 2
+    for line in textwrap.wrap(text.strip(), width, initial_indent=hanging, subsequent_indent=hanging):
+        yield f"{indent}# {line}\n"
 
 
 def _key(
@@ -125,24 +159,27 @@ def _key(
     known = model.model_fields[name]
     choices = type_text(known.annotation)
     meaning = f"{known.description}; {choices}" if choices.startswith("one of") else str(known.description)
-    lines = [f"{indent}# {text}\n" for text in (meaning, *notes)]
+    lines = [line for text in (meaning, *notes) for line in _comment(text, indent)]
     if value is None:
         return [*lines, f"{indent}# {name}: {value_text(known.get_default())}\n"]
-    return [*lines, f"{indent}{name}: {value_text(value)}\n"]
+    return [*lines, *entry(f"{name}: ", value, indent)]
 
 
 def _recording(draft: RecordingDraft, explained: bool) -> Iterator[str]:
     indent = "    "
     if not explained:
         yield f"\n  - name: {value_text(draft.name)}\n"
-        yield from (f"{indent}# {note}\n" for note in draft.notes)
-        yield f"{indent}# {draft.why}\n{indent}kind: {draft.kind}\n{indent}files: {value_text(draft.files)}\n"
+        for note in (*draft.notes, draft.why):
+            yield from _comment(note, indent)
+        yield f"{indent}kind: {draft.kind}\n"
+        yield from entry("files: ", draft.files, indent)
         if draft.rate_hz is not None:
             yield f"{indent}rate_hz: {value_text(draft.rate_hz)}\n"
         yield from _log(draft.log, indent)
         return
     yield f"  # {Recording.model_fields['name'].description}\n  - name: {value_text(draft.name)}\n"
-    yield from (f"{indent}# {note}\n" for note in draft.notes)
+    for note in draft.notes:
+        yield from _comment(note, indent)
     yield from _key(Recording, "kind", draft.kind, indent, [draft.why])
     yield from _key(Recording, "files", draft.files, indent)
     yield from _key(Recording, "rate_hz", draft.rate_hz, indent)
@@ -161,34 +198,30 @@ def _log(log: LogDraft | None, indent: str) -> Iterator[str]:
     form = f" ({', '.join(log.form)})" if log.form else ""
     yield f"{indent}# {Recording.model_fields['log'].description}\n"
     yield f"{indent}# it has the columns{form}\n"
-    yield from (f"{indent}#   {line}\n" for line in _wrapped(log.there, WIDTH - len(indent) - 4))
+    yield from _comment("  " + ", ".join(log.there), indent)
     yield f"{indent}log:\n{inner}family: {log.family}\n"
     if log.table is not None:
         others = f"; others with gyros: {', '.join(log.unused)}" if log.unused else ""
-        yield f"{inner}# {fields['table'].description}{others}\n{inner}table: {value_text(log.table)}\n"
+        yield from _comment(f"{fields['table'].description}{others}", inner)
+        yield f"{inner}table: {value_text(log.table)}\n"
+    else:
+        yield f"{inner}# {fields['table'].description}\n{inner}# table: null\n"
+    yield f"{inner}# {fields['text'].description}\n{inner}# text: {{}}\n"
     yield f"{inner}# {fields['time'].description}\n"
     if log.time is None:
         yield f"{inner}time: null\n"
     else:
         stamp: dict[str, str] = {"column": log.time} | ({"unit": log.time_unit} if log.time_unit else {})
-        yield f"{inner}# meaning: {LogTime.model_fields['meaning'].description}; {log.meaning or 'found when it is read'}\n"
-        yield f"{inner}time: {value_text(stamp)}\n"
+        meaning = LogTime.model_fields["meaning"].description
+        yield from _comment(f"meaning: {meaning}; {log.meaning or 'found when it is read'}", inner)
+        yield from entry("time: ", stamp, inner)
     if log.values is not None:
         kind = "floating-point" if log.values == "rates" else "whole"
         yield f"{inner}# {fields['values'].description}; a guess, for the columns hold {kind} numbers\n"
         yield f"{inner}values: {log.values}\n"
+    yield f"{inner}# {fields['clocks'].description}\n{inner}# clocks: auto\n"
     yield f"{inner}# {fields['columns'].description}; only where the names differ\n"
     yield f"{inner}columns:{'' if log.places else ' {}'}\n"
-    yield from (f"{inner}  {name}: {value_text(place)}\n" for name, place in log.places.items())
+    for name, place in log.places.items():
+        yield from entry(f"{name}: ", place, f"{inner}  ")
     yield from (f"{inner}  # {name}: no column found\n" for name in log.missing)
-
-
-def _wrapped(words: list[str], width: int) -> Iterator[str]:
-    line = ""
-    for word in words:
-        if line and len(line) + 2 + len(word) > width:
-            yield line + ","
-            line = word
-        else:
-            line = f"{line}, {word}" if line else word
-    yield line

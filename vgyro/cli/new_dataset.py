@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import re
 from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vgyro.board import Board
     from vgyro.cli.found import Found
-    from vgyro.cli.manifest_text import RecordingDraft
 
 EPILOG = """\
 examples:
@@ -41,25 +39,31 @@ ENDINGS = (
     ".db3", ".npy", ".npz", ".mat", ".json", ".jsonl",
 )  # fmt: skip
 
+KINDS = ("static", "constant", "random", "sinusoid", "thermal", "free")
+
 
 def add_arguments(parser: argparse.ArgumentParser, files: str = "+") -> None:
     """Declare the arguments. files : how many"""
     what = "dump or log (.gz and .zst too), or a folder of logs"
     parser.add_argument("files", nargs=files, metavar="FILE", type=Path, help=what)
     parser.add_argument("--name", help="name of the data set; default: that of the files' folder")
-    parser.add_argument("--board", help="board in config/boards, or path of a board file; default: the one that fits best")
+    parser.add_argument(
+        "--board", help="board in config/boards, or path of a board file; default: the one that fits best"
+    )
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second, for files without time stamps")
-    parser.add_argument("--scale", type=_ratio, metavar="DEG_S", help="deg/s a count of a log's gyros: 0.00875, or 1/131")
+    parser.add_argument(
+        "--scale", type=_ratio, metavar="DEG_S", help="deg/s a count of a log's gyros: 0.00875, or 1/131"
+    )
     parser.add_argument("--unit", choices=("deg/s", "rad/s", "mdps", "deg/h"), help="unit of a log's gyros")
     parser.add_argument("--axis", metavar="NAME", help="axis of all gyros of a log; default: by their names, else z")
     both = parser.add_mutually_exclusive_group()
     both.add_argument(
         "--together", action="store_true", default=None, help="the files are one array, read by a clock each"
     )
-    both.add_argument(
-        "--separate", action="store_false", dest="together", help="the files are recordings of their own"
-    )
-    parser.add_argument("--kind", help="kind of every recording; default: static or free, as the gyros move")
+    both.add_argument("--separate", action="store_false", dest="together", help="the files are recordings of their own")
+    kinds = ", ".join(KINDS)
+    what = f"kind of every recording: {kinds}; default: static or free, as the gyros move"
+    parser.add_argument("--kind", type=_kind, metavar="KIND", help=what)
     parser.add_argument("--raw", type=Path, default=Path("raw"), help="default: %(default)s")
     parser.add_argument("--boards", type=Path, default=Path("config/boards"), help="default: %(default)s")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON")
@@ -106,20 +110,26 @@ def write(options: argparse.Namespace) -> tuple[Path, Found]:
     return target, found
 
 
+def _kind(text: str) -> str:
+    """A kind that needs no more than its name.  raises : ArgumentTypeError"""
+    if text == "calibration":
+        what = "calibration needs the plateaus of the rate table"
+        raise argparse.ArgumentTypeError(f"{what}: leave --kind out, then set kind and reference in dataset.yaml")
+    if text not in KINDS:
+        raise argparse.ArgumentTypeError(f"expected one of {', '.join(KINDS)}, found {text!r}")
+    return text
+
+
 def _ratio(text: str) -> float:
     """A positive number, also as a fraction.  raises : ArgumentTypeError"""
+    parts = text.split("/")
     try:
-        value = float(Fraction(text.replace(" ", ""))) if "/" not in text else _divided(text)
-    except (ValueError, ZeroDivisionError):
+        over, *under = [float(part) for part in parts]
+    except ValueError:
         raise argparse.ArgumentTypeError(f"expected a number such as 0.00875 or 1/131, found {text!r}") from None
-    if not value > 0:
-        raise argparse.ArgumentTypeError(f"expected a number greater than 0, found {text!r}")
-    return value
-
-
-def _divided(text: str) -> float:
-    over, under = text.split("/")
-    return float(Fraction(over.strip()) / Fraction(under.strip()))
+    if len(under) > 1 or not all(0 < part < math.inf for part in (over, *under)):
+        raise argparse.ArgumentTypeError(f"expected a number greater than 0, such as 0.00875 or 1/131, found {text!r}")
+    return over / under[0] if under else over
 
 
 def target_of(options: argparse.Namespace, must_exist: bool = False) -> Path:

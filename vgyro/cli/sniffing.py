@@ -6,12 +6,14 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from vgyro.board import Board
+from vgyro.cli.looking import HEAD_ROWS, head_of
 from vgyro.cli.manifest_text import LogDraft
 from vgyro.errors import DataError
 from vgyro.log import Log
-from vgyro.storage.frames import channel_watches
+from vgyro.storage.frames import gyro_rails
 from vgyro.storage.inputs import files_inside, read_board
 from vgyro.storage.layout import kept_channels
 from vgyro.storage.logs.families import family_of, open_log
@@ -22,29 +24,32 @@ from vgyro.storage.sniff import all_boards, sniff
 ENOUGH = 0.5
 RATE_TOLERANCE = 0.01
 MOST_OUT_OF_RANGE = 0.5
-HEAD_ROWS = 20_000
+BEYOND_RANGE = 1.5
 
 
-def is_dump(path: Path, boards: Path) -> bool:
+def is_dump(path: Path, boards: Path, named: Board | None = None) -> bool:
     """Is a file a dump of frames? A text is one where a board's lines make up most of it.
 
+    named  : the board that the user names, which need not be one of the folder `boards`
     raises : DataError where it is neither a dump of a known board nor a log
     """
     if path.is_dir():
         return False
+    known = all_boards(boards) if named is None else [named]
     try:
         family = family_of(path)
     except DataError as error:
-        found = sniff(path, all_boards(boards))
+        found = sniff(path, known)
         if found and found[0].good_share >= ENOUGH:
             return True
         best = f"; the nearest, {found[0].board}, explains {found[0].good_share:.0%} of it" if found else ""
         remedy = "name the board by --board, or describe it (docs/extending.md)"
-        what = f"no board of {boards} fits its first megabyte{best}; and as a log it {error.what}"
+        fits = f"no board of {boards} fits" if named is None else f"board {named.name} does not fit"
+        what = f"{fits} its first megabyte{best}; and as a log it {error.what}"
         raise DataError(what, str(path), error.remedy or remedy) from None
     if family != "text":
         return False
-    found = sniff(path, all_boards(boards))
+    found = sniff(path, known)
     return bool(found) and found[0].good_share >= ENOUGH
 
 
@@ -88,22 +93,36 @@ def board_of_columns(path: Path, boards: Path) -> tuple[Board | None, list[str]]
 
 
 def holds_counts(opened: LogFile, table: LogTable, board: Board) -> bool:
-    """Are the gyros' columns whole numbers, most of them within the board's rails? Not where it has no rails."""
+    """Are the gyros' columns whole numbers, most of them within the board's rails and the gyro's range?
+
+    Not where the board has neither. The range counts half as much again: a gyro gives more than its data sheet says.
+    """
     columns = [gyro.field for gyro in board.gyros]
-    batch = next(iter(opened.rows(table.name, columns))).batch
-    watches = channel_watches(board)
-    for name, column in zip(columns, batch.columns, strict=True):
-        values, watch = _known(column), watches[name]
-        if not len(values) or not np.isfinite(watch.high) or np.any(values != np.rint(values)):
+    rows = next(iter(opened.rows(table.name, columns)), None)
+    if rows is None:
+        return False
+    for gyro, column in zip(board.gyros, rows.batch.columns, strict=True):
+        if not pa.types.is_integer(column.type) and not pa.types.is_floating(column.type):
             return False
-        if np.mean((values <= watch.low) | (values >= watch.high)) > MOST_OUT_OF_RANGE:
+        values, (low, high) = _known(column), gyro_rails(board, gyro)
+        if not len(values) or not np.isfinite(high) or np.any(values != np.rint(values)):
+            return False
+        outside = (values <= low) | (values >= high)
+        if gyro.range_deg_s is not None:
+            outside |= np.abs(values - gyro.bias) * gyro.scale > BEYOND_RANGE * gyro.range_deg_s
+        if outside.mean() > MOST_OUT_OF_RANGE:
             return False
     return True
 
 
-def _known(column: object) -> np.ndarray:
-    values = column.to_numpy(zero_copy_only=False)[:HEAD_ROWS].astype(np.float64)  # type: ignore[attr-defined]
+def _known(column: pa.Array) -> np.ndarray:
+    values = column.to_numpy(zero_copy_only=False)[:HEAD_ROWS].astype(np.float64)
     return values[np.isfinite(values)]
+
+
+def _fractions(values: np.ndarray) -> bool:
+    """Are some values no whole numbers?"""
+    return values.dtype.kind == "f" and bool(np.any(np.isfinite(values) & (values != np.rint(values))))
 
 
 def opened_log(path: Path) -> LogFile:
@@ -125,9 +144,8 @@ def log_draft(path: Path, board: Board) -> LogDraft:
             columns[found or gyro.field] = found or str(alike)
         else:
             missing.append(gyro.field)
-    batch = next(iter(opened.rows(table.name, list(there)))).batch
-    head = {name: batch.column(name).to_numpy(zero_copy_only=False)[:HEAD_ROWS] for name in there}
-    floating = any(np.any(known != np.rint(known)) for known in (_known(batch.column(one)) for one in columns.values()))
+    head = head_of(opened, table)
+    floating = any(_fractions(head[column]) for column in columns.values())
     return LogDraft(
         family=opened.family,
         there=list(there),
