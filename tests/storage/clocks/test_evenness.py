@@ -75,10 +75,29 @@ def test_odd_steps_of_rounded_stamps_with_jitter(rng):
 
 
 @pytest.mark.parametrize(("spread", "beat"), [(0.25, True), (0.35, False)])
-def test_how_regular_odd_steps_must_be(spread, beat):
-    apart = np.rint(260 * (1 + spread * np.array([1, -1] * 15))).astype(int)
+def test_how_regular_odd_steps_must_be(rng, spread, beat):
+    scatter = rng.normal(size=30)
+    scatter = (scatter - scatter.mean()) / scatter.std()
+    apart = np.rint(260 * (1 + spread * scatter)).astype(int)
     rows = np.delete(K, np.cumsum(apart))
     assert (run(rows, unit="ms").record.lost == 0) == beat
+
+
+def test_losses_among_regular_odd_steps():
+    stamps = np.delete(np.floor(np.arange(30_000) / 997 * 1000 + 1e-6), [9000, 16_100, 23_300])
+    result = run(stamps, unit="ms")
+    assert result.record.lost == 3
+    assert result.end_rate == pytest.approx(997, rel=2e-4)
+
+
+@pytest.mark.parametrize("ratio", [1.98, 3.31, 5.96, 15.55])
+def test_bursts_of_nearly_a_whole_number_of_samples(rng, ratio):
+    """Locally the period seems to be a fraction of the burst's, with a sample lost, or doubled, now and then."""
+    k = np.arange(25_000)
+    stamps = np.ceil(k / ratio) * ratio / 500 + rng.exponential(0.0006, len(k))
+    result = run(stamps, unit="s")
+    assert (result.record.meaning, result.record.lost) == ("arrival", 0)
+    assert result.end_rate == pytest.approx(500, rel=2e-4)
 
 
 @pytest.mark.parametrize(("count", "beat"), [(8, False), (9, True)])

@@ -32,6 +32,7 @@ FEW_STEPS = 1000  # … or, of fewer steps, times the former bound
 ROUNDED_STEPS = 0.3  # resolution, periods
 MIN_BEATS, BEAT_SPREAD = 8, 0.3  # regular odd steps: distances between them, and their s.d. over their mean
 BURST_ROWS = 32  # of the envelope in which odd steps of bursts are looked for
+REACH = 192  # rows after a loss within which it shows
 ENVELOPE_ROWS = 256  # of the blocks whose minima tell the noise of the envelope
 HORIZON, LONGEST_HORIZON = 2048, 65_536  # rows over which an envelope is taken
 
@@ -53,6 +54,7 @@ class Judgement(NamedTuple):
     jitter     : s, r.m.s. about the grid; of the steps if uneven
     resolution : s
     horizon    : rows of the envelope; noise: of the envelope, one sigma, s
+    reach      : rows after a loss within which it shows
     least_loss : samples that must be missing in a row to be seen
     pause      : s, a longer step is an interruption, of uneven stamps
     why        : a sentence
@@ -66,6 +68,7 @@ class Judgement(NamedTuple):
     resolution: float
     horizon: int
     noise: float
+    reach: int
     least_loss: int
     pause: float
     why: str
@@ -87,9 +90,9 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
        steps below half a period, they are sampled: time is the stamp. Else they are arrival times, never earlier than
        the sample: time is the lower envelope.
     3. Off the grid: sampled unevenly, time is the stamp.
-    Steps that are all the resolution or a multiple: samples are missing, unless the odd ones come regularly (nine or
-    more, distances with a s.d. below 0.3 of their mean, chance gives 1): then the period is no whole number of ticks.
-    Likewise for bursts of nearly a whole number of samples.
+    Steps of one or more whole resolutions: samples are missing, unless the odd ones come regularly (nine or more,
+    distances with a s.d. below 0.3 of their mean, chance gives 1; or 17 or more, below 0.15 of their median): then the
+    period is no whole number of ticks. Likewise for bursts of nearly a whole number of samples.
     What this cannot tell: latency that wanders over more than m rows looks like a walk, and a lost sample at regular
     distances like rounding, if the period is one tick.
 
@@ -110,9 +113,7 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
         period, resolution = (resolution, finest) if beat is None else (resolution * beat.factor, resolution)
     phase_sd, short = _step_phase(steps, period)
     even, why = _on_grid(times, period, phase_sd, short)
-    if meaning == "arrival":
-        even = True
-    if not even:
+    if not even and meaning != "arrival":
         return _uneven(times, period, resolution, why)
     if len(times) >= FEW and beat is None and not on_tick:
         period = refined_period(times, period, lag)
@@ -126,15 +127,36 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     # Rounding by more than this moves single steps by as much as a lost sample does.
     fine = not coarse or resolution < ROUNDED_STEPS * period
     steady = jitter < STEADY_JITTER and time_from != "envelope" and fine
-    if not math.isfinite(jitter) or jitter > SMALL_JITTER:
+    if jitter > SMALL_JITTER:
         jitter = _local_jitter(times, period)
-    horizon = _horizon(len(times), resolution / period) if beat is None else _beat_horizon(beat.rows)
+    why = f"{why}; {why_time}"
+    return _even(times, period, resolution, jitter, time_from, steady, coarse, beat, why)
+
+
+def _even(
+    times: np.ndarray,
+    period: float,
+    resolution: float,
+    jitter: float,
+    time_from: Literal["stamps", "line", "envelope"],
+    steady: bool,
+    coarse: bool,
+    beat: Beat | None,
+    why: str,
+) -> Judgement:
+    """How losses are looked for on a grid."""
+    horizon, reach = _horizon(len(times), resolution / period), REACH
+    if beat is not None:
+        # A rounded stamp moves against the grid for as many rows before it jumps back.
+        horizon = int(min(max(HORIZON, 1.5 * beat.rows), LONGEST_HORIZON))
+        reach = int(min(max(REACH, 1.2 * beat.rows), horizon))
     noise = _envelope_noise(times, period, horizon if coarse or beat else min(ENVELOPE_ROWS, horizon))
     # Five sigma of the envelope, and at least half a period.
     least = 1 if steady else max(1, math.ceil(min(5 * noise / period + 0.5, 1e9)))
-    why = f"{why}; {why_time}"
     losses: Literal["steps", "level"] = "steps" if steady else "level"
-    return Judgement(period, True, time_from, losses, jitter * period, resolution, horizon, noise, least, math.inf, why)
+    return Judgement(
+        period, True, time_from, losses, jitter * period, resolution, horizon, noise, reach, least, math.inf, why
+    )
 
 
 def _step_phase(steps: np.ndarray, period: float) -> tuple[float, float]:
@@ -192,7 +214,7 @@ def _uneven(times: np.ndarray, period: float, resolution: float, why: str) -> Ju
     mean = float(usual.mean()) if len(usual) and usual.mean() > 0 else period
     spread = float(usual.std()) if len(usual) else 0.0
     why = f"{why}; sampled unevenly, steps {mean:.4g} s ± {spread:.2g} s"
-    return Judgement(mean, False, "stamps", "pauses", spread, resolution, 1, 0.0, 1, pause, why)
+    return Judgement(mean, False, "stamps", "pauses", spread, resolution, 1, 0.0, 1, 1, pause, why)
 
 
 def _time_from(
@@ -238,9 +260,12 @@ def _beat(ticks: np.ndarray) -> Beat | None:
     apart = np.diff(odd)
     if len(apart) < MIN_BEATS or np.mean(np.diff(ahead[odd]) == 1) < 0.95:
         return None
-    if float(apart.std()) >= BEAT_SPREAD * float(apart.mean()):
-        return None
     rows = float(apart.mean())
+    if float(apart.std()) >= BEAT_SPREAD * rows:
+        # A few lost samples among many regular steps.
+        rows = float(np.median(apart))
+        if len(apart) < 2 * MIN_BEATS or robust_sd(apart) >= BEAT_SPREAD / 2 * rows:
+            return None
     return Beat(rows, 1 + np.sign(ticks.mean() - 1) / rows)
 
 
@@ -250,11 +275,6 @@ def _beat_of_bursts(times: np.ndarray, period: float) -> Beat | None:
     envelope = forward_min(times / period - np.arange(len(times)), width)[: len(times) - width + 1]
     phase = float(np.angle(np.exp(2j * np.pi * envelope).mean())) / (2 * np.pi)
     return _beat(np.diff(np.rint(envelope - phase)) + 1)
-
-
-def _beat_horizon(rows: float) -> int:
-    """A rounded stamp moves against the grid for as many rows before it jumps back."""
-    return int(min(max(HORIZON, 1.5 * rows), LONGEST_HORIZON))
 
 
 def _local_jitter(times: np.ndarray, period: float) -> float:

@@ -13,7 +13,6 @@ from vgyro.storage.clocks.windows import backward_min, forward_min
 STRETCH = 1 << 17  # rows judged at a time
 NEAR = 16  # rows on each side of a long step whose median tells the level
 SETTLE = 48  # rows after which the level after a loss is read
-REACH = 4 * SETTLE  # … or later, where bursts of nearly a whole number of samples hide it for a while
 TAIL = 64  # rows that must follow a loss of arrival stamps, at least
 WHOLE = 0.3  # periods by which a lasting step may differ from whole ones
 WHOLE_SHARE = 1e-3  # … and this share of itself
@@ -57,7 +56,7 @@ class LossFinder:
         self._back, self._ahead = {
             "steps": (NEAR, NEAR),
             "pauses": (1, 0),
-            "level": (judgement.horizon, judgement.horizon + REACH),
+            "level": (judgement.horizon, judgement.horizon + judgement.reach),
         }[judgement.losses]
         self._reset()
 
@@ -140,7 +139,7 @@ class LossFinder:
         # Rows too near the end of a piece are not judged.
         stop = min(high, len(times) - tail_rows(grid) + 1) if last else high
         limit = (grid.least_loss - 0.5) * period
-        scan = _Scan(raised, ahead, lasts, period, limit, width, grid.noise)
+        scan = _Scan(raised, ahead, lasts, period, limit, width, grid)
         found = scan.run(max(low, 1), stop)
         shifts = np.zeros(high)
         shifts[found.rows] = found.shift
@@ -176,10 +175,11 @@ class _Scan:
         period: float,
         limit: float,
         width: int,
-        noise: float,
+        grid: Judgement,
     ) -> None:
         self.raised, self.ahead, self.lasts = raised, ahead, lasts
-        self.period, self.limit, self.width, self.noise = period, limit, width, noise
+        self.period, self.limit, self.width = period, limit, width
+        self.noise, self.reach = grid.noise, grid.reach
         self._first = backward_min(raised, width)
 
     def run(self, low: int, stop: int) -> Found:
@@ -220,8 +220,8 @@ class _Scan:
         return row, self._height(self._steps(max(0, row - self.width), row, row + 1), row, 0)
 
     def _steps(self, origin: int, row: int, end: int) -> np.ndarray:
-        """The step at rows from `row` to REACH after `end`, with what was found so far taken away."""
-        behind = backward_min(self.raised[origin : end + REACH], self.width)[row - origin :]
+        """The step at rows from `row` to `reach` after `end`, with what was found so far taken away."""
+        behind = backward_min(self.raised[origin : end + self.reach], self.width)[row - origin :]
         step = self.ahead[row : row + len(behind)] - behind
         return np.where(np.isfinite(step), step, -np.inf)
 
@@ -235,19 +235,19 @@ class _Scan:
         near = step[hit : hit + settle]
         low, middle, high = np.quantile(near, [0.25, 0.5, 0.75]).tolist()
         others = [near[: settle // 2], near[: settle // 4]] if high - low >= FLAT * self.period else []
-        if settle == SETTLE and len(self.ahead) - row - hit > 2 * REACH:
-            others += [step[hit + settle : hit + 2 * settle], step[hit + 2 * settle : hit + REACH]]
+        if settle == SETTLE and len(self.ahead) - row - hit > 2 * self.reach:
+            others += [step[hit + settle : hit + 2 * settle], step[hit + 2 * settle : hit + self.reach]]
         heights = [middle, *(float(np.median(part)) for part in others if len(part))]
         return next((height for height in heights if self._weigh(height)[0]), middle)
 
     def _place(self, row: int, shift: float, stop: int) -> int:
         """The loss comes after the last row that is still below the new level."""
-        end = min(row + REACH, stop)
+        end = min(row + self.reach, stop)
         level = float(self.raised[max(0, row - self.width) : row].min()) + shift
         low = np.flatnonzero(self.raised[row:end] < level - max(SURELY * self.period, 3 * self.noise))
         row = min(row + int(low[-1]) + 1, stop - 1) if len(low) else row
         # A row that is on the wrong side after all must not hide the next loss, or make one.
-        self.raised[row : row + REACH] = np.maximum(self.raised[row : row + REACH], level)
+        self.raised[row : row + self.reach] = np.maximum(self.raised[row : row + self.reach], level)
         return row
 
     def _weigh(self, height: float) -> tuple[int, float]:

@@ -30,7 +30,7 @@ def survey(blocks: Iterable[tuple[np.ndarray, np.ndarray]], options: ClockOption
     """Find out what the time stamps of a recording are.
 
     The first 131 072 rows tell what they are (see `judge`, `keep_rule`); all rows tell rate, losses and drift. Memory
-    grows by 48 bytes in 1024 rows, and by 16 bytes for each place where samples are missing.
+    grows by 40 bytes in 1024 rows, and by 16 bytes for each place where samples are missing.
 
     blocks  : (stamps [n] int64 or float64, same bool [n]: the row equals the one before in every channel), in order
     returns : the Clock; `place` takes the same blocks again

@@ -97,14 +97,22 @@ def refined_period(times: np.ndarray, period: float, rough_lag: int) -> float:
         fold = excess - centre - np.rint(excess - centre)
         sharp = float(np.quantile(np.abs(fold), 0.84)) < 0.25
         if rough:
-            # Whole bursts would fold away as well.
-            sharp = float(np.quantile(np.abs(excess - middle), 0.75)) < 0.25
+            # Whole bursts would fold away as well, and one lag may be just one burst.
+            sharp = all(_agree(envelope, period, span) for span in (lag, lag + lag // 2))
         change = (centre + midmean(fold) if sharp else middle) / lag
         if abs(change) < MOST_OFF and (sharp or lag >= rough_lag):
             period *= 1 + change
             rough = False
         lag *= 2
     return period
+
+
+def _agree(times: np.ndarray, period: float, lag: int) -> bool:
+    """Three quarters of the advances over a lag lie within a quarter of a period."""
+    if len(times) <= lag:
+        return False
+    advance = (times[lag:] - times[:-lag]) / period
+    return float(np.quantile(np.abs(advance - np.median(advance)), 0.75)) < 0.25
 
 
 def resolution_ticks(stamps: np.ndarray) -> float:
