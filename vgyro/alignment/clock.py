@@ -202,7 +202,7 @@ def _clock(fit: PairFit, evidence: Evidence, starts: tuple[float, float], most_p
     if not known:
         line = Line(line.centre_s, line.lag_s, 0.0)
     lag_error = math.sqrt(fit.covariance[0, 0])
-    start = offset(line)
+    start = float(offset(line))
     reach = line.centre_s - start
     if known:
         variance = np.array([-1.0, reach]) @ fit.covariance @ np.array([-1.0, reach])
@@ -221,7 +221,7 @@ def _clock(fit: PairFit, evidence: Evidence, starts: tuple[float, float], most_p
         drift,
         drift - drift_half,
         drift + drift_half,
-        status == FOUND and (abs(start - stamped) > stricter * half or abs(drift) > stricter * drift_half),
+        bool(status == FOUND and (abs(start - stamped) > stricter * half or abs(drift) > stricter * drift_half)),
         status,
         evidence,
         starts,
@@ -230,4 +230,5 @@ def _clock(fit: PairFit, evidence: Evidence, starts: tuple[float, float], most_p
 
 
 def _nothing(status: str, starts: tuple[float, float], evidence: Evidence | None = None) -> ClockFit:
-    return ClockFit(*[math.nan] * 6, False, status, evidence or Evidence(), starts, (math.nan, math.nan, math.nan))
+    nan = math.nan
+    return ClockFit(nan, nan, nan, nan, nan, nan, False, status, evidence or Evidence(), starts, (nan, nan, nan))

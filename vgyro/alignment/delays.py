@@ -147,6 +147,7 @@ def _fit(bands: list[Band], delay: np.ndarray) -> _Fit | None:
     if min(len(band.time) for band in bands) < 2:
         return None
     weight = np.full(len(bands), 1 / len(bands))
+    shifted: _Shifted | None = None
     for _ in range(MOST_STEPS):
         delay = delay - weight @ delay
         shifted = _shift(bands, delay)
@@ -170,6 +171,8 @@ def _fit(bands: list[Band], delay: np.ndarray) -> _Fit | None:
         weight = weight / weight.sum()
         if (np.abs(step - step.mean()) < SMALL_STEP * error).all():
             break
+    if shifted is None:
+        return None
     return _Fit(delay, influence, mean_slope, shifted.blocks)
 
 
@@ -214,7 +217,7 @@ def _spread_out(
     result[:, columns] = delay, delay - z * error, delay + z * error
     significant = np.zeros(gyros, dtype=bool)
     significant[columns] = np.abs(delay) > strict * error
-    return Delays(*result, significant, FOUND, moving_s)
+    return Delays(result[0], result[1], result[2], significant, FOUND, moving_s)
 
 
 def _none(gyros: int, status: str) -> Delays:

@@ -129,7 +129,7 @@ def apart(one: PairFit, two: PairFit) -> float:
     gaps = []
     for fit in (one, two):
         first, last = fit.reach
-        gaps += [abs(float(one.line.at(np.float64(t)) - two.line.at(np.float64(t)))) for t in (first, last)]
+        gaps += [abs(one.line.at(t) - two.line.at(t)) for t in (first, last)]
     return max(gaps)
 
 

@@ -10,9 +10,11 @@ import numpy as np
 from vgyro.alignment.blocks import SHORTEST_S, Blocks, independent_values, score_covariance
 from vgyro.alignment.interpolation import interpolate
 from vgyro.alignment.streams import Band
+from vgyro.units import Quantity
 
 MOST_STEPS = 15
 SMALL_STEP = 0.01  # of a standard error: the search has ended
+NOT_SETTLED = 3.0  # standard errors: it has not, after the last step
 FEWEST_POINTS = 16
 QUIET_QUANTILE = 0.1
 STANDS_OUT = 2.0  # power of a block in motion over that of the quiet ones
@@ -26,8 +28,8 @@ class Line(NamedTuple):
     lag_s: float
     drift: float
 
-    def at(self, time: np.ndarray) -> np.ndarray:
-        """Readings of the other clock at times of the reference's, [M] s."""
+    def at(self, time: Quantity) -> Quantity:
+        """Readings of the other clock at times of the reference's, s: a float or [M]."""
         return time + self.lag_s + self.drift * (time - self.centre_s)
 
     def about(self, centre_s: float) -> Line:
@@ -79,6 +81,7 @@ def fit_line(
     nor its standard error.
     """
     line, farthest = start, 0.5 / reference.cutoff_hz
+    overlap: _Overlap | None = None
     for _ in range(MOST_STEPS):
         overlap = _overlap(reference, other, rows, number, line)
         if overlap is None:
@@ -107,7 +110,9 @@ def fit_line(
             return None
         if (np.abs(step) < SMALL_STEP * error).all():
             break
-    covariance = np.full((2, 2), 0.0)
+    if overlap is None or (np.abs(step) > NOT_SETTLED * error).any():
+        return None
+    covariance = np.zeros((2, 2))
     covariance[1, 1] = np.inf
     covariance[:used, :used] = inverse @ score_covariance(overlap.blocks, slopes, residual) @ inverse.T
     correlation = float(one @ two) / math.sqrt(float(one @ one) * float(two @ two))
