@@ -105,7 +105,8 @@ class TableWriter:
         # Computed numbers hardly repeat: their bytes, not a dictionary, are what can be compressed.
         counted = self._schema in COUNTED
         floats = [field.name for field in schema if pa.types.is_floating(field.type)]
-        numbers = [name for name in floats if not counted or name == "time"]
+        # Floats in frames are those of a log, or of a board that sends them: measured values, few of which repeat.
+        numbers = [name for name in floats if not counted or name == "time" or self._schema == "frames"]
         encoding = dict.fromkeys(numbers if self._compression != "none" else (), "BYTE_STREAM_SPLIT")
         whole = [field.name for field in schema if counted and pa.types.is_integer(field.type)]
         encoding.update(dict.fromkeys(whole, "DELTA_BINARY_PACKED"))
