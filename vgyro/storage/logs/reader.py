@@ -235,8 +235,8 @@ def infinite_notes(intakes: Sequence[Intake]) -> list[str]:
 def file_record(path: Path, head: LogFile, paths: Sequence[str | Path]) -> FileRecord:
     """Name, size and hash of a log."""
     size = path.stat().st_size if path.is_file() else sum(one.stat().st_size for one in path.rglob("*"))
-    digest = sha256_of_file(path) if path.is_file() else ""
     account = head.account
+    digest = account.sha256 or (sha256_of_file(path) if path.is_file() else "")
     return FileRecord(_shown(path, paths), size, digest, account.compression, account.content_bytes or size)
 
 

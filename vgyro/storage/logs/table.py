@@ -74,6 +74,7 @@ class Account:
 
     rows  : rows given;  bad : damaged lines;  other : lines of other kinds, comments and headers (no damage)
     notes : warnings as sentences, such as "the last line has no end: taken, for it has all its fields"
+    sha256 : of the file, where it was taken while it was read; else empty
     """
 
     rows: int = 0
@@ -82,6 +83,7 @@ class Account:
     notes: list[str] = field(default_factory=list)
     content_bytes: int = 0
     compression: str = "none"
+    sha256: str = ""
 
 
 class LogFile(Protocol):

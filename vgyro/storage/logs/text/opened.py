@@ -71,6 +71,7 @@ class TextLog:
         for rows in stream:
             account.rows += rows.batch.num_rows
             yield rows
+        account.sha256 = source.sha256
         account.content_bytes = lines.content_bytes + self._head.encoding.mark
         if source.cut_short:
             account.notes.append(f"the {source.compression} data break off: what could be unpacked is read")
