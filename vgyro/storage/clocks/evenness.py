@@ -30,6 +30,7 @@ LONG_PAUSE = 5.0  # mean steps, and …
 BEYOND_USUAL = 2.0  # … times the 99.9th percentile of the steps …
 FEW_STEPS = 1000  # … or, of fewer steps, times the former bound
 ROUNDED_STEPS = 0.3  # resolution, periods
+SHORTEST_BEAT = 3.0  # rows; closer odd steps are not odd
 MIN_BEATS, BEAT_SPREAD = 8, 0.3  # regular odd steps: distances between them, and their s.d. over their mean
 BURST_ROWS = 32  # of the envelope in which odd steps of bursts are looked for
 REACH = 192  # rows after a loss within which it shows
@@ -266,6 +267,8 @@ def _beat(ticks: np.ndarray) -> Beat | None:
         rows = float(np.median(apart))
         if len(apart) < 2 * MIN_BEATS or robust_sd(apart) >= BEAT_SPREAD / 2 * rows:
             return None
+    if rows < SHORTEST_BEAT:
+        return None
     return Beat(rows, 1 + np.sign(ticks.mean() - 1) / rows)
 
 
