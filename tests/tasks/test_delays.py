@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from task_chain import RATE_HZ, SIGMA, Chain
+
 from vgyro.tasks import convert, faults, fuse, noise
 
 GYROS = ("g1", "g2", "g3", "g4")

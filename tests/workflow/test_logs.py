@@ -24,7 +24,7 @@ def text_of(seconds: float, first: float = 0.0, seed: int = 1) -> str:
     count = round(seconds * RATE_HZ)
     rates = rng.normal(0, 0.05, (count, 3)) + [0.1, -0.2, 0.3]
     rows = [f"{first + k / RATE_HZ:.3f},{a:.4f},{b:.4f},{c:.4f}" for k, (a, b, c) in enumerate(rates)]
-    return "\n".join(["t (s),g1 (deg/s),g2 (deg/s),g3 (deg/s)", *rows, ""])
+    return "".join(f"{row}\n" for row in ("t (s),g1 (deg/s),g2 (deg/s),g3 (deg/s)", *rows))
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,8 @@ def test_snakemake_names_the_pages_that_it_made(lab, page):
     assert f"report: {lab.folder / 'reports/stranger.html'}" in page
 
 
-def test_again_there_is_nothing_to_do(lab, page):
+@pytest.mark.usefixtures("page")
+def test_again_there_is_nothing_to_do(lab):
     again = lab.vgyro("run", "--name", "stranger")
     assert again.returncode == 0, again.stdout
     assert "Nothing to be done" in again.stdout

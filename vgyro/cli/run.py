@@ -52,7 +52,8 @@ def run(options: argparse.Namespace) -> int:
     if (code := _check(manifest, options)) != 0:
         return code
     page = Path("reports") / f"{name}.html"
-    command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), "--config", f"only={name}", "--quiet", "rules", "host", "--", "one"]
+    snakemake = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), "--quiet", "rules", "host"]
+    command = [*snakemake, "--config", f"only={name}", "--", "one"]
     ended = subprocess.run(command, check=False)
     if ended.returncode != 0:
         return 1

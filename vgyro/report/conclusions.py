@@ -173,7 +173,7 @@ def limits(dataset: DatasetPart) -> list[Conclusion]:
         whose = "every gyro" if len(unmeasured) == len(dataset.board.gyros) else named(unmeasured)
         words = f"Nominal scale for {whose}: absolute figures carry the data sheet's error."
         if rates_as_logged(dataset):
-            words = f"Rates as logged for {whose}: absolute figures carry the error of a scale that was not measured here."
+            words = f"Rates as logged for {whose}: absolute figures carry the error of a scale not measured here."
         found.append(Conclusion(words, "warn", "calibration"))
     for recording in dataset.recordings:
         found += _incomplete(recording)

@@ -20,8 +20,8 @@ NOMINAL_WORDS = (
 )
 LOGGED_WORDS = (
     "Rates as logged: the log holds them in a unit of rate, so whoever wrote it chose the scale, and there is no "
-    "calibration recording to check it by. Every figure below in deg/s, deg/h or deg/√h carries its error (several percent "
-    "for most MEMS gyros)."
+    "calibration recording to check it by. Every figure below in deg/s, deg/h or deg/√h carries its error (several "
+    "percent for most MEMS gyros)."
 )
 LOGGED_COLUMNS = (
     Column("gyro", numeric=False),
