@@ -22,7 +22,7 @@ def text_of(seconds: float, first: float = 0.0, seed: int = 1) -> str:
     """A simulated log of three gyros in deg/s, seconds with decimals."""
     rng = np.random.default_rng(seed)
     count = round(seconds * RATE_HZ)
-    rates = rng.normal(0, 0.05, (count, 3)) + [0.1, -0.2, 0.3]
+    rates = rng.normal((0.1, -0.2, 0.3), 0.05, (count, 3))
     rows = [f"{first + k / RATE_HZ:.3f},{a:.4f},{b:.4f},{c:.4f}" for k, (a, b, c) in enumerate(rates)]
     return "".join(f"{row}\n" for row in ("t (s),g1 (deg/s),g2 (deg/s),g3 (deg/s)", *rows))
 
