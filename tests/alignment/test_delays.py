@@ -40,6 +40,15 @@ def test_of_two_gyros_each_has_half() -> None:
     assert found.significant.all()
 
 
+@pytest.mark.parametrize(("apart", "others"), [(0.04, 0.0), (0.4, -0.5)])
+def test_gyros_within_a_tenth_of_a_sample_are_the_others(apart: float, others: float) -> None:
+    # Small delays, far beyond the noise: together they are the others' time; if they are larger, the mean of all is.
+    rng = np.random.default_rng(1)
+    true = np.array([0.0, apart, -apart, 2 * apart, -2 * apart, 3.0]) / RATE
+    found = relative_delays(board(rng, random_motion(rng, 20), true), RATE)
+    np.testing.assert_allclose(found.delay_s, true + others / RATE, atol=0.02 / RATE)
+
+
 @pytest.mark.parametrize("kind", ["plain", "noises and walk", "weak", "burst"])
 def test_equal_gyros_have_no_delay(kind: str) -> None:
     for seed in range(3):

@@ -21,6 +21,7 @@ NEARLY = 0.99  # of the best agreement: among such peaks of a periodic motion th
 MOST_STEPS = 12
 SMALL_STEP = 0.01
 SCALE_STEPS = 20
+SAME_SAMPLES = 0.1  # delays that differ by less serve together as the others' time
 SAME = 5.0  # standard errors within which gyros have one delay
 SHORTEST_S = 2.0
 SLOW_HZ = 4.0
@@ -29,8 +30,9 @@ SLOW_HZ = 4.0
 class Delays(NamedTuple):
     """How much later each gyro reads the motion than the others do.
 
-    delay_s     : [N], s; positive: late, its rate at t + delay is the motion at t. Against the mean of the largest
-                  group of gyros that agree; of two gyros, and where no such group is found, against the mean of all
+    delay_s     : [N], s; positive: late, its rate at t + delay is the motion at t. Against the mean of the group of
+                  gyros around the middle one that agree (to a tenth of a sample and the noise); of two gyros, and
+                  where less than half agree, against the mean of all
     low, high   : [N], s, 95 % interval of each
     significant : bool [N]; of a recording of equal gyros one or more are marked with a chance of 1 % at most
     status      : "found", "no motion" (rest, or gyros that do not see the same) or "too few gyros"; figures are NaN
@@ -93,7 +95,7 @@ def relative_delays(
         fit = _fit([low_pass(stream, cutoff) for stream in streams], start)
         if fit is None:
             continue
-        delay, error = _against_the_group(fit)
+        delay, error = _against_the_group(fit, SAME_SAMPLES / rate_hz)
         if best is None or (error**2).sum() < (best[1] ** 2).sum():
             best = delay, error
     if best is None:
@@ -190,13 +192,13 @@ def _scales(rate: np.ndarray) -> np.ndarray:
     return scale
 
 
-def _against_the_group(fit: _Fit) -> tuple[np.ndarray, np.ndarray]:
+def _against_the_group(fit: _Fit, tolerance_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Delays against the mean of the gyros that agree, and their standard errors: [N], [N]."""
     gyros = len(fit.delay)
     everyone = np.ones(gyros, dtype=bool)
     delay, error = _contrast(fit, everyone)
     middle = np.argsort(delay)[(gyros - 1) // 2 : gyros // 2 + 1]
-    group = np.abs(delay - delay[middle].mean()) <= SAME * np.hypot(error, error[middle].mean())
+    group = np.abs(delay - delay[middle].mean()) <= tolerance_s + SAME * np.hypot(error, error[middle].mean())
     if group.all() or 2 * group.sum() <= gyros:
         return delay, error
     return _contrast(fit, group)
