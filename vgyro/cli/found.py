@@ -272,8 +272,8 @@ def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | Non
         draft.why = f"{100 * share:.0f} % of the time at rest: {draft.kind}"
     frames = record.frames
     lines = [f"  {draft.name}:" if len(found.drafts) > 1 else ""]
-    lines.append(f"  samples    {frames.good} at {record.rate_hz:.6g} Hz, {record.duration_s:.6g} s; {frames.lost} lost,"
-                 f" {frames.bad} damaged, {frames.repeated} repeated")  # fmt: skip
+    counts = f"{frames.lost} lost, {frames.bad} damaged, {frames.repeated} repeated"
+    lines.append(f"  samples    {frames.good} at {record.rate_hz:.6g} Hz, {record.duration_s:.6g} s; {counts}")
     lines += _clock_lines(record)
     for clock in record.clocks:
         if draft.log is not None and draft.log.time is not None:

@@ -1,4 +1,4 @@
-"""Log files → the rows of each stream, as logged: stamps, channels, and what is damaged. Nothing is placed in time yet."""
+"""Log files → the rows of each stream, as logged: stamps, channels, what is damaged. Nothing is placed in time yet."""
 
 from __future__ import annotations
 
@@ -48,8 +48,7 @@ class Intake:
 
     def take(self, batch: pa.RecordBatch, factors: Mapping[str, float]) -> None:
         """Keep the rows of a batch that belong to the stream."""
-        for column, value in self.stream.where:
-            batch = batch.filter(matches(batch.column(column), value))
+        batch = self.own(batch)
         if not batch.num_rows:
             return
         columns = {}
@@ -64,6 +63,12 @@ class Intake:
             columns[STAMP] = numbers(batch.column(self.time.column))
         self.spool.append({**columns, SAME: same})
 
+    def own(self, batch: pa.RecordBatch) -> pa.RecordBatch:
+        """The rows that belong to the stream."""
+        for column, value in self.stream.where:
+            batch = batch.filter(matches(batch.column(column), value))
+        return batch
+
     def _same(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         same = np.ones(len(next(iter(columns.values()))), dtype=bool)
         for channel, values in columns.items():
@@ -73,7 +78,8 @@ class Intake:
             else:
                 same[0] &= _equal(values[:1], before)[0]
             same[1:] &= _equal(values[1:], values[:-1])
-            self._last[channel] = values[-1:]
+            # A view would keep its whole block in memory.
+            self._last[channel] = values[-1:].copy()
         return same
 
 
@@ -90,9 +96,7 @@ def numbers(column: pa.Array) -> np.ndarray:
     kind = column.type
     if pa.types.is_boolean(kind):
         column = column.cast(pa.int8())
-    elif pa.types.is_decimal(kind):
-        column = column.cast(pa.float64())
-    elif pa.types.is_null(kind):
+    elif pa.types.is_decimal(kind) or pa.types.is_null(kind):
         column = column.cast(pa.float64())
     elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
         raise ValueError(f"a column of {kind} holds no numbers")
@@ -102,13 +106,25 @@ def numbers(column: pa.Array) -> np.ndarray:
 
 
 def matches(column: pa.Array, value: int | float | str) -> pa.Array:
-    """Which rows hold a value, as number or as text."""
+    """Which rows hold a value, as number or as text: 2, 2.0 and "2" are one."""
     kind = column.type
-    if pa.types.is_integer(kind) or pa.types.is_floating(kind):
-        found = pc.equal(column.cast(pa.float64()), float(value))
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
+        wanted = as_number(value)
+        if wanted is None:
+            return pa.array(np.zeros(len(column), dtype=bool))
+        found = pc.equal(column.cast(pa.float64()), wanted)
     else:
-        found = pc.equal(pc.utf8_trim_whitespace(column.cast(pa.string())), str(value))
+        said = f"{value:g}" if isinstance(value, float) else str(value)
+        found = pc.equal(pc.utf8_trim_whitespace(column.cast(pa.string())), said)
     return pc.fill_null(found, False)
+
+
+def as_number(value: int | float | str) -> float | None:
+    """A value of an id column as a number; None for a word."""
+    try:
+        return float(value)
+    except ValueError:
+        return None
 
 
 @dataclass
@@ -174,10 +190,9 @@ def _read(
 ) -> None:
     stamps = [intake.time.column for intake in intakes if intake.time is not None]
     tests = [column for intake in intakes for column, _ in intake.stream.where]
-    wanted = [column for intake in intakes for column in intake.stream.columns.values()]
-    wanted = list(dict.fromkeys([*wanted, *stamps, *tests]))
-    name = table_of(opened, table, wanted).name
-    for rows in opened.rows(name, wanted):
+    wanted = list(dict.fromkeys([*(one for intake in intakes for one in intake.stream.columns.values()), *stamps]))
+    name = table_of(opened, table, wanted, tests).name
+    for rows in opened.rows(name, list(dict.fromkeys([*wanted, *tests]))):
         _note(rows, opened.path.name, intakes, ledger)
         for intake in intakes:
             intake.take(rows.batch, factors)
@@ -191,4 +206,4 @@ def _note(rows: Rows, name: str, intakes: Sequence[Intake], ledger: Ledger) -> N
             if intake.time is None:
                 # Lines of other kinds aside, the rows before it in this batch.
                 before = min(max(line.place - rows.place - number, 0), rows.batch.num_rows)
-                intake.damaged.append(intake.spool.rows + before)
+                intake.damaged.append(intake.spool.rows + intake.own(rows.batch.slice(0, before)).num_rows)

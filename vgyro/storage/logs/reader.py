@@ -9,7 +9,6 @@ from pathlib import Path
 from vgyro.board import Board
 from vgyro.config import IntegrityOptions
 from vgyro.dataset import Recording
-from vgyro.errors import DataError
 from vgyro.log import Log, LogArray, Values
 from vgyro.storage.frames import Frames, channel_watches
 from vgyro.storage.integrity import FileRecord, Integrity, Ledger
@@ -19,7 +18,7 @@ from vgyro.storage.logs.joined import Joined
 from vgyro.storage.logs.placing import Placing
 from vgyro.storage.logs.streams import streams_of
 from vgyro.storage.logs.table import LogFile
-from vgyro.storage.logs.uneven import is_suspect, uneven_note
+from vgyro.storage.logs.uneven import MOST_UNEVEN, too_uneven, uneven_note
 from vgyro.storage.tables import sha256_of_file
 from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
 
@@ -48,7 +47,7 @@ class LogReader:
         self.rate_hz = self.recording.rate_hz or self.board.rate_hz
         self._files = log_files(self.paths)
         self._heads, self._left_out = open_all(self._files, self.log, self.engine)
-        self._streams = streams_of(self._files, self.log, self.board, self.array, self._heads)
+        self._streams = streams_of(self._files, self.log, self.board, self.array, self._heads, self._left_out)
         self._ledger = Ledger()
         self._watches = channel_watches(self.board, rates=self.values == "rates")
 
@@ -70,11 +69,10 @@ class LogReader:
         self._good, self._end, self._segments = 0, None, 0
         if len(taken.intakes) == 1:
             clocks = [Placing(taken.intakes[0], self.rate_hz, self.board)]
-            frames = clocks[0].frames(self._ledger)
+            frames, notes = clocks[0].frames(self._ledger), list[str]()
         else:
             joined = Joined(taken.intakes, self.recording, self.rate_hz, self.board)
-            taken.notes += joined.notes
-            frames, clocks = joined.frames(self._ledger), joined.placings
+            frames, clocks, notes = joined.frames(self._ledger), joined.placings, joined.notes
         for chunk in frames:
             self._good += len(chunk.counter)
             if len(chunk.counter):
@@ -83,11 +81,10 @@ class LogReader:
                 if name in chunk.counts:
                     watch.feed(chunk.counts[name], chunk.time)
             yield chunk
-        # Those who could not be brought to the array's time are told of while it is read.
-        notes = joined.notes if len(taken.intakes) > 1 else []
         self._conclude(taken, clocks, notes)
 
-    def _conclude(self, taken: Taken, clocks: Sequence[Placing]) -> None:
+    def _conclude(self, taken: Taken, clocks: Sequence[Placing], notes: Sequence[str]) -> None:
+        """The record. clocks : of the streams, that of the array's times first."""
         where = str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more"
         records = [one.record() for one in clocks]
         outcome = Outcome(
@@ -105,8 +102,19 @@ class LogReader:
             left_out=[*self._left_out, *taken.left_out],
         )
         channels = {name: watch.record() for name, watch in self._watches.items() if watch.samples}
-        notes = [*taken.notes, *infinite_notes(taken.intakes), *(note for one in clocks for note in one.warnings())]
-        self.integrity = conclude(outcome, self._ledger, channels, self.options, notes)
+        uneven = [one for one in clocks if one.uneven > 0]
+        hints = [
+            *taken.notes,
+            *notes,
+            *infinite_notes(taken.intakes),
+            *(note for one in clocks for note in one.warnings()),
+        ]
+        hints += [uneven_note(one.uneven, one.rate_hz, one.intake.stream.name) for one in uneven]
+        self.integrity = conclude(outcome, self._ledger, channels, self.options, hints)
+        reasons = [too_uneven(one.uneven, one.intake.stream.name) for one in uneven if one.uneven > MOST_UNEVEN]
+        if reasons:
+            status = "suspect" if self.integrity.status == "good" else self.integrity.status
+            self.integrity = replace(self.integrity, status=status, reasons=[*self.integrity.reasons, *reasons])
         refuse_if_needed(self.integrity, self.options, where, lambda: "check `log` and `rate_hz` in the manifest")
 
 

@@ -1,8 +1,10 @@
-"""Rows of a stream, kept aside between the reading and the placing in time: in memory, or on disk where they are many."""
+"""Rows of a stream, kept aside between the reading and the placing in time: in memory, on disk where they are many."""
 
 from __future__ import annotations
 
+import shutil
 import tempfile
+import weakref
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 MOST_IN_MEMORY = 1 << 26
+"""Bytes of a spool that stay in memory; blocks that come later go to disk."""
 
 
 class Stored(NamedTuple):
@@ -27,7 +30,8 @@ class Stored(NamedTuple):
 class Spool:
     """Blocks of columns, read back in order as often as wanted.
 
-    A column's type is the one that holds all its blocks: whole numbers stay so where no value is missing.
+    The folder on disk goes with the spool. A column's type is the one that holds all its blocks: whole numbers stay so
+    where no value is missing.
     """
 
     def __init__(self) -> None:
@@ -35,7 +39,7 @@ class Spool:
         self.types: dict[str, np.dtype] = {}
         self._blocks: list[dict[str, np.ndarray] | Stored] = []
         self._bytes = 0
-        self._folder: tempfile.TemporaryDirectory | None = None
+        self._folder: Path | None = None
 
     def append(self, columns: dict[str, np.ndarray]) -> None:
         """Keep a block; all columns are of one length."""
@@ -54,15 +58,11 @@ class Spool:
             found = {name: block.read(name) if isinstance(block, Stored) else block[name] for name in names}
             yield {name: values.astype(self.types[name], copy=False) for name, values in found.items()}
 
-    def column(self, name: str) -> np.ndarray:
-        """One column as a whole [rows]."""
-        parts = [block[name] for block in self.blocks([name])]
-        return np.concatenate(parts) if parts else np.empty(0)
-
     def _store(self, columns: dict[str, np.ndarray]) -> Stored:
         if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="vgyro-")
-        path = Path(self._folder.name) / str(len(self._blocks))
+            self._folder = Path(tempfile.mkdtemp(prefix="vgyro-"))
+            weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        path = self._folder / str(len(self._blocks))
         places, offset = {}, 0
         with open(path, "wb") as stream:
             for name, values in columns.items():

@@ -39,11 +39,16 @@ class Stream:
 
 
 def streams_of(
-    files: Sequence[Path], log: Log, board: Board, array: LogArray | None, heads: Mapping[Path, LogFile]
+    files: Sequence[Path],
+    log: Log,
+    board: Board,
+    array: LogArray | None,
+    heads: Mapping[Path, LogFile],
+    left_out: Sequence[str] = (),
 ) -> list[Stream]:
     """The streams of a recording, in the order of the board's gyros.
 
-    files  : of the recording, in order, folders opened;  heads : those that can be read
+    files  : of the recording, in order, folders opened;  heads : those that can be read;  left_out : why not others
     raises : DataError if a gyro has no column; a thermometer or another channel without one is left out
     """
     readable = [path for path in files if path in heads]
@@ -52,7 +57,7 @@ def streams_of(
     order = [gyro.field for gyro in board.gyros]
     for channel in dict.fromkeys([*order, *kept_channels(board)]):
         place, said = place_of(channel, log, board, array)
-        chosen = _files_of(place, readable, files)
+        chosen = _files_of(place, readable, files, left_out)
         table = place.table if place.table is not None else log.table
         if channel not in needed and not said and not _has(heads[chosen[0]], table, place.column):
             continue
@@ -63,7 +68,7 @@ def streams_of(
 
 
 def place_of(channel: str, log: Log, board: Board, array: LogArray | None) -> tuple[Place, bool]:
-    """Where a channel stands, and whether the manifest says so: by its own name or its gyro's, else by the same name."""
+    """Where a channel stands, and whether the manifest says so: by its own or its gyro's name, else by the same one."""
     names = [channel, *(gyro.name for gyro in board.gyros if gyro.field == channel)]
     for name in names:
         if (place := log.place(name)) is not None:
@@ -73,14 +78,31 @@ def place_of(channel: str, log: Log, board: Board, array: LogArray | None) -> tu
     return Place(column=channel), False
 
 
-def _files_of(place: Place, readable: Sequence[Path], files: Sequence[Path]) -> tuple[Path, ...]:
+def _files_of(
+    place: Place, readable: Sequence[Path], files: Sequence[Path], left_out: Sequence[str]
+) -> tuple[Path, ...]:
     if place.file is None:
         return tuple(readable)
-    chosen = [path for path in readable if fnmatch.fnmatch(path.name, place.file) or path.match(place.file)]
+    chosen = [path for path in readable if _fits(path, place.file)]
     if not chosen:
+        unread = [
+            why for path, why in zip(files_left(files, readable), left_out, strict=False) if _fits(path, place.file)
+        ]
+        if unread:
+            what = f"gyros stand in {place.file}, which cannot be read: {unread[0]}"
+            raise DataError(what, None, "mend the file, or take its gyros out of the manifest")
         near = did_you_mean(place.file, [path.name for path in files])
         raise DataError(f"no readable file of the recording fits {place.file!r}{near}", None, "correct `file` in `log`")
     return tuple(chosen)
+
+
+def _fits(path: Path, pattern: str) -> bool:
+    return fnmatch.fnmatch(path.name, pattern) or path.match(pattern)
+
+
+def files_left(files: Sequence[Path], readable: Sequence[Path]) -> list[Path]:
+    """Files that cannot be read, in order."""
+    return [path for path in files if path not in readable]
 
 
 def _has(log: LogFile, table: str | None, column: str) -> bool:
@@ -92,38 +114,42 @@ def _table(log: LogFile, table: str | None, column: str) -> str:
     return table_of(log, table, [column]).name
 
 
-def table_of(log: LogFile, table: str | None, columns: Sequence[str]) -> LogTable:
+def table_of(log: LogFile, table: str | None, columns: Sequence[str], ids: Sequence[str] = ()) -> LogTable:
     """The table of a log that holds some columns; `table`: by that name.
 
+    ids    : columns that tell rows apart, which may hold text
     raises : DataError that lists what is there
     """
     where = str(log.path)
     if table is not None:
         for known in log.tables:
             if known.name == table:
-                _check(known, columns, where)
+                _check(known, columns, ids, where)
                 return known
         names = [known.name for known in log.tables]
         raise DataError(f"has no table {table!r}{did_you_mean(table, names)}", where, "correct `table` in `log`")
-    fitting = [known for known in log.tables if set(columns) <= {column.name for column in known.columns}]
+    wanted = {*columns, *ids}
+    fitting = [known for known in log.tables if wanted <= {column.name for column in known.columns}]
     if len(fitting) == 1:
+        _check(fitting[0], columns, ids, where)
         return fitting[0]
     if fitting:
-        names = ", ".join(known.name for known in fitting)
-        raise DataError(f"has several tables with a column {columns[0]!r}: {names}", where, "name one: `table` in `log`")
+        listed = ", ".join(known.name for known in fitting)
+        raise DataError(
+            f"has several tables with a column {columns[0]!r}: {listed}", where, "name one: `table` in `log`"
+        )
     largest = max(log.tables, key=lambda known: len(known.columns))
-    _check(largest, columns, where)
+    _check(largest, columns, ids, where)
     raise DataError(f"has no table with the columns {', '.join(columns)}", where, "name the tables in `log.columns`")
 
 
-def _check(table: LogTable, columns: Sequence[str], where: str) -> None:
+def _check(table: LogTable, columns: Sequence[str], ids: Sequence[str], where: str) -> None:
     names = [column.name for column in table.columns]
-    for column in columns:
+    for column in [*columns, *ids]:
         if column not in names:
             remedy = "name the log's columns in the manifest, under `log.columns` or `array`"
             raise DataError(f"has no column {column!r}{did_you_mean(column, names)}", where, remedy)
-        found = column_of(table, column)
-        if found.kind == "text":
+        if column not in ids and column_of(table, column).kind == "text":
             raise DataError(f"column {column!r} holds text, not numbers", where, "name another column")
 
 
