@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import AllanCurve, allan_deviation, model_deviation, noise_coefficients
-from vgyro.metrics.allan_model import low_pass_factor
+from vgyro.metrics.allan_model import low_pass_factor, solve
 
 N, B, K = 6.17 / 60, 54.11 / 3600, 294.3 / 216000  # Jiang et al. (2012), table 2, in deg/s units
 
@@ -187,3 +187,10 @@ def test_only_allan_deviations_are_fitted():
 def test_model_deviation_is_the_fitted_curve():
     curve = exact_curve(N, B, K)
     np.testing.assert_allclose(model_deviation(curve.tau, noise_coefficients(curve)), curve.deviation, rtol=1e-5)
+
+
+def test_terms_that_one_tau_alone_tells_share_its_variance():
+    """Two columns of one shape have no single solution: closed form of the shortest, both equal."""
+    columns = np.array([[1.0, 1.0], [2.0, 2.0]])
+    unknowns, _ = solve(columns, np.array([[3.0, 6.0]]), np.ones(2), bounded=0)
+    assert unknowns[0] == pytest.approx([1.5, 1.5])

@@ -147,12 +147,23 @@ def solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray, bounded
     gram = (scaled.T @ scaled) * (chosen[:, :, None] & chosen[:, None, :])
     gram[:, range(len(norm)), range(len(norm))] += ~chosen
     right = ((targets * np.sqrt(weights)) @ scaled).T
-    values = np.linalg.solve(gram, right * chosen[:, :, None])
+    values = _solved(gram, right * chosen[:, :, None])
     explained = (values * right).sum(axis=1)
     explained[(values[:, :bounded] < 0).any(axis=1)] = -np.inf
     best = np.argmax(explained, axis=0)
     row = np.arange(len(targets))
     return values[best, :, row] / norm, explained[best, row]
+
+
+def _solved(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solutions [S, C, R] of symmetric equations; the shortest one where some are singular.
+
+    They are where the weights leave a single τ: there the shapes of two terms are the same.
+    """
+    try:
+        return np.linalg.solve(gram, right)
+    except np.linalg.LinAlgError:
+        return np.linalg.pinv(gram, hermitian=True) @ right
 
 
 @cache
