@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from vgyro.errors import DataError
@@ -123,6 +123,7 @@ def test_data_that_break_off(opened):
         (bytes(range(256)) * 10, "is not a text"),
         (b"Dear all,\nthe gyro was dropped\nSorry\n", "line 1: holds no table of numbers"),
         (gzip.compress(b""), "unpacks to nothing"),
+        (b"0a\n0b\n0c\n", "line 1: holds no table of numbers"),
         (b"1,2,3\n" * 30 + b"all,my,words\n" * 40, "line 31: holds no table of numbers"),
     ],
 )
@@ -288,6 +289,7 @@ ANYTHING = st.one_of(
 )
 
 
+@example(b"0\n0a", "native")
 @given(ANYTHING, st.sampled_from(["native", "native", "reference"]))
 @settings(max_examples=200, deadline=None)
 def test_any_bytes(tmp_path_factory, content, engine):

@@ -140,7 +140,7 @@ def fits(cells: Sequence[str], found: Typed, decimal: str, codec: str) -> bool:
         cell, field = cells[place], found.fields[place]
         label = field.label.decode(codec)
         bare = cell[len(label) :].strip() if cell.startswith(label) else "?"
-        right += not missing(bare) and (is_value(bare, decimal) or kind_of([bare], decimal)[0] in VALUES)
+        right += not missing(bare) and is_value(bare, decimal)
         right += field.kind == "hex" and bool(re.fullmatch("[0-9A-Fa-f]+", bare)) and not is_value(bare, decimal)
     empty = sum(missing(cells[place]) for place in values)
     return right > 0 and right >= FITTING * (len(values) - empty)

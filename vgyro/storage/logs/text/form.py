@@ -215,6 +215,8 @@ class Finder:
             )  # fmt: skip
             raise self._unread((number, self.head.lines[number - 1]), f"{count} cells as in line {start}")
         found, naming = self._named(sample(good), before, signs, header)
+        if not found.numbers:
+            raise self._unread(own[0], "a row of numbers")
         found, naming = _with_lead(found, naming, lead, [line for number, line in body if number >= start])
         if self.given.header is False:
             start = min(number for number, _ in cells)
