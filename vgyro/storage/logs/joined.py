@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,14 +54,20 @@ class Joined:
         self._log, self._kind, self._board = recording.log, recording.kind, board
         self.notes: list[str] = []
         gyros = {gyro.field for gyro in board.gyros}
-        placings = []
-        for intake in intakes:
+        placings: list[Placing] = []
+        units: dict[tuple[Path, ...], str] = {}
+        for intake in sorted(intakes, key=lambda one: gyros.isdisjoint(one.stream.columns)):
+            files = intake.stream.files
             try:
-                placings.append(Placing(intake, rate_hz, board))
+                # One column of one log has one unit, which a slow thermometer cannot tell.
+                placing = Placing(intake, rate_hz, board, units.get(files))
             except DataError as error:
                 if not gyros.isdisjoint(intake.stream.columns):
                     raise
                 self._leave_out(intake, str(error))
+                continue
+            placings.append(placing)
+            units.setdefault(files, placing.clock.record().unit)
         with_gyros = [placing for placing in placings if placing.has_gyros]
         # Rates that differ by less than clocks do are one rate.
         slowest = min(placing.rate_hz for placing in with_gyros)

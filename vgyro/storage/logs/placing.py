@@ -26,11 +26,12 @@ class Placing:
     """One stream on its clock.
 
     intake  : its rows;  rate_hz : declared;  board : whose gyros are among its channels
+    unit    : of the stamps, where another stream of the same column told it
     origin_s : what the log's own clock read at time 0 of the frames, s; known when the first block was placed
     raises  : DataError where the stamps do not tell the rate and none is declared
     """
 
-    def __init__(self, intake: Intake, rate_hz: float | None, board: Board) -> None:
+    def __init__(self, intake: Intake, rate_hz: float | None, board: Board, unit: str | None = None) -> None:
         self.intake = intake
         self.alignment: dict[str, Any] = {}
         self.origin_s = 0.0
@@ -39,15 +40,18 @@ class Placing:
         # A row of thermometers alone is empty without any reading of theirs.
         self._needed = here or list(intake.stream.columns)
         if not intake.spool.rows:
-            raise DataError("has no row", intake.stream.name, "check `log.columns` in the manifest")
+            raise DataError("has no row", intake.stream.where_it_is, "check `log.columns` in the manifest")
         self.clock: Clock | RowClock
         if intake.time is None:
-            self.clock = RowClock(rate_hz, intake.damaged, intake.stream.name)
+            self.clock = RowClock(rate_hz, intake.damaged, intake.stream.where_it_is)
             return
         try:
-            self.clock = survey(self._stamps(), clock_options(intake, rate_hz))
+            options = clock_options(intake, rate_hz)
+            if unit and options.unit == "auto":
+                options = options._replace(unit=unit)
+            self.clock = survey(self._stamps(), options)
         except DataError as error:
-            raise DataError(error.what, error.where or intake.stream.name, error.remedy) from None
+            raise DataError(error.what, error.where or intake.stream.where_it_is, error.remedy) from None
 
     @property
     def rate_hz(self) -> float:
@@ -87,7 +91,8 @@ class Placing:
         record = self.clock.record()
         for gap in record.gaps:
             ledger.add_gap(gap.time, gap.duration, gap.lost, gap.cause)
-        period, breaks, after_hole, first = 1 / record.rate_hz, 0, False, True
+        holes = Holes(ledger, 1 / record.rate_hz)
+        breaks, after_hole, first = 0, False, True
         for block in self.intake.spool.blocks([*self._stamp_name(), SAME, *self.intake.stream.columns]):
             same = block.pop(SAME)
             stamps = block.pop(STAMP, np.arange(len(same)))
@@ -96,8 +101,7 @@ class Placing:
                 self.origin_s, first = origin_of(stamps[placed.keep], placed.time, placed.segment, record), False
             columns = {name: values[placed.keep] for name, values in block.items()}
             empty = without_value([columns[name] for name in self._needed])
-            for start, stop in runs_of(empty):
-                ledger.add_gap(float(placed.time[start]), (stop - start) * period, stop - start, WITHOUT_VALUE)
+            holes.take(empty, placed.time)
             ledger.bad += int(empty.sum())
             begins = np.append(after_hole, empty[:-1]) & ~empty if len(empty) else empty
             segment = placed.segment + breaks + np.cumsum(begins, dtype=np.int32)
@@ -145,6 +149,36 @@ def clock_options(intake: Intake, rate_hz: float | None) -> ClockOptions:
         name=intake.time.column,
         day=intake.kind == "day",
     )
+
+
+class Holes:
+    """Runs of rows without a value, across blocks. Those before the first value and behind the last one are no gaps."""
+
+    def __init__(self, ledger: Ledger, period: float) -> None:
+        self._ledger, self._period = ledger, period
+        self._begun: float | None = None
+        self._rows = 0
+        self._inside = False
+
+    def take(self, empty: np.ndarray, time: np.ndarray) -> None:
+        """The next rows. empty : bool [n];  time : [n] s"""
+        if not len(empty):
+            return
+        if not empty[0]:
+            self._close()
+        for start, stop in runs_of(empty):
+            if start or self._begun is None:
+                self._inside |= start > 0
+                self._begun = float(time[start])
+            self._rows += stop - start
+            if stop < len(empty):
+                self._close()
+        self._inside |= not empty.all()
+
+    def _close(self) -> None:
+        if self._begun is not None and self._inside:
+            self._ledger.add_gap(self._begun, self._rows * self._period, self._rows, WITHOUT_VALUE)
+        self._begun, self._rows, self._inside = None, 0, True
 
 
 def without_value(columns: Sequence[np.ndarray]) -> np.ndarray:

@@ -32,6 +32,11 @@ class Stream:
     columns: Mapping[str, str]
 
     @property
+    def where_it_is(self) -> str:
+        """The same with the path of its first file, for messages."""
+        return f"{self.files[0]}{self.name.removeprefix(self.files[0].name)}"
+
+    @property
     def name(self) -> str:
         """What tells it from the others of its recording, for people."""
         rows = ", ".join(f"{column} = {value}" for column, value in self.where)

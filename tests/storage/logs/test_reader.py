@@ -1,47 +1,21 @@
-"""Archived logs: files, folders, dates; counts and rates; gaps in the time column."""
+"""Logs → frames: files, folders, dates; counts and rates; gaps in the time column, rows and channels without values."""
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
+from log_files import AXES, COUNT, counts, frames_of, stack, write
 
-from vgyro.config import IntegrityOptions
-from vgyro.dataset import Recording
-from vgyro.log import Log
 from vgyro.errors import DataError
-from vgyro.storage import Refused, open_recording
-from vgyro.storage.frames import gather
-
-AXES = ("gyro_x", "gyro_y", "gyro_z")
-COUNT = 5000
 
 
 @pytest.fixture
 def values():
-    return np.random.default_rng(1).integers(-50, 50, (COUNT, 3)).astype(np.int16)
+    return counts()
 
 
 @pytest.fixture
 def read(board):
-    def run(paths, options=None, **log):
-        recording = Recording(name="a", kind="static", files=("x",), log=Log(**log))
-        paths = paths if isinstance(paths, list) else [paths]
-        reader = open_recording(paths, recording, board("adis16405"), options or IntegrityOptions())
-        frames = gather(reader, board("adis16405"))
-        return frames._replace(integrity=reader.integrity)
-
-    return run
-
-
-def write(path, values, names=AXES, **more):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    columns = {name: values[:, index] for index, name in enumerate(names)}
-    pq.write_table(pa.table({**columns, **more}), path)
-    return path
-
-
-def stack(frames):
-    return np.column_stack([frames.counts[name] for name in AXES])
+    return lambda paths, options=None, **log: frames_of(paths, board("adis16405"), options, **log)
 
 
 def test_one_file(read, values, tmp_path):
@@ -156,7 +130,7 @@ def test_what_is_not_a_log(read, values, tmp_path):
     (tmp_path / "a.parquet").write_bytes(b"not parquet at all")
     (tmp_path / "b.parquet").write_bytes(b"")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(DataError, match="column"):
+    with pytest.raises(DataError, match="holds only a header: found 'not parquet at all'"):
         read(tmp_path / "a.parquet")
     with pytest.raises(DataError, match="is empty: 0 bytes"):
         read(tmp_path / "b.parquet")
@@ -164,7 +138,7 @@ def test_what_is_not_a_log(read, values, tmp_path):
         read(tmp_path / "empty")
     with pytest.raises(DataError, match="no such file"):
         read(tmp_path / "c.parquet")
-    with pytest.raises(Refused):
+    with pytest.raises(DataError, match="has no row"):
         read(write(tmp_path / "d.parquet", values[:0]))
     with pytest.raises(DataError, match="not numbers"):
         read(write(tmp_path / "e.parquet", values[:1], names=("gyro_x", "gyro_y", "g"), gyro_z=["a"]))
