@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from vgyro.dataset import values_of
+from vgyro.log import Place
 from vgyro.report.certificate import certificate
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import DatasetPart, Record
@@ -74,10 +75,27 @@ def _logged_table(dataset: DatasetPart) -> Markup:
     array = dataset.manifest.array
     if array is None:
         return Markup("")
-    columns = array.columns
-    rows = [[Cell(gyro.name), Cell(gyro.axis), Cell(columns[gyro.name]), Cell(str(gyro.unit))] for gyro in array.gyros]
+    log = dataset.manifest.recordings[0].log
+    places = {gyro.name: log and log.place(gyro.name) for gyro in array.gyros}
+    rows = [
+        [
+            Cell(gyro.name),
+            Cell(gyro.axis),
+            Cell(*_place(places[gyro.name], array.columns[gyro.name])),
+            Cell(str(gyro.unit)),
+        ]
+        for gyro in array.gyros
+    ]
     table = render_table(LOGGED_COLUMNS, rows)
     return details(f"Columns of {len(rows)} gyros", table) if len(rows) > FEW else table
+
+
+def _place(place: Place | None, column: str) -> tuple[str, str]:
+    """The column of a gyro, and what tells it from others of that name."""
+    if place is None:
+        return column, ""
+    rows = [f"{name} {value}" for name, value in place.where.items()]
+    return place.column, ", ".join(part for part in (place.file, place.table, *rows) if part)
 
 
 def _measured(dataset: DatasetPart, axis: str) -> dict[str, Record]:
