@@ -76,7 +76,7 @@ def _logged_table(dataset: DatasetPart) -> Markup:
     if array is None:
         return Markup("")
     log = dataset.manifest.recordings[0].log
-    places = {gyro.name: log and log.place(gyro.name) for gyro in array.gyros}
+    places = {gyro.name: None if log is None else log.place(gyro.name) for gyro in array.gyros}
     rows = [
         [
             Cell(gyro.name),
