@@ -126,3 +126,14 @@ def test_ids_are_gyros_of_one_array_brought_to_one_time(read):
     assert len(found.board.gyros) == EXPECTED["id_column.csv"]["gyros"]
     skew = [clock["alignment"].get("offset_s", 0.0) for clock in found.integrity.clocks]
     assert skew == pytest.approx([1e-6 * us for us in EXPECTED["id_column.csv"]["skew_us"]], abs=1e-6)
+
+
+def test_files_on_clocks_of_their_own_become_one_array(read):
+    expected = EXPECTED["own_clock_*.csv"]
+    found = read(*(CASES / name for name in expected["files"]), options=["--rate", "100"])
+    truths = list(expected["files"].values())
+    for clock, truth in zip(found.integrity.clocks[1:], truths[1:], strict=True):
+        assert clock["alignment"]["offset_s"] == pytest.approx(truth["offset_s"], abs=0.002)
+        assert clock["alignment"]["drift_ppm"] == pytest.approx(truth["ppm"], abs=15)
+    assert found.means == pytest.approx([np.mean(found.means) + truth["bias"] + 1 / 30 for truth in truths], abs=0.01)
+    assert "by the motion in common" in found.outcome.out
