@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,6 +20,14 @@ def log_files(paths: Sequence[str | Path]) -> list[Path]:
     for path in map(Path, paths):
         found += files_inside(path) if path.is_dir() else [path]
     return found
+
+
+def shown_names(paths: Sequence[Path]) -> dict[Path, str]:
+    """Names of the files for people: of each alone, or with the folders below the common one where two are alike."""
+    if len({path.name for path in paths}) == len(set(paths)):
+        return {path: path.name for path in paths}
+    common = Path(os.path.commonpath([path.absolute().parent for path in paths]))
+    return {path: path.absolute().relative_to(common).as_posix() for path in paths}
 
 
 def open_all(paths: Sequence[Path], log: Log, engine: str) -> tuple[dict[Path, LogFile], list[str]]:

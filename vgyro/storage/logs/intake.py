@@ -142,10 +142,11 @@ def take_in(
     array: LogArray | None,
     heads: Mapping[Path, LogFile],
     ledger: Ledger,
+    names: Mapping[Path, str],
 ) -> Taken:
     """Read every file once and sort its rows by stream.
 
-    heads : the opened logs;  ledger : gets the damaged lines
+    heads : the opened logs;  ledger : gets the damaged lines;  names : of the files, for people
     raises : DataError where a column is missing, and where no file can be read
     """
     factors = {} if array is None else {gyro.name: factor_of(gyro.unit) for gyro in array.gyros}
@@ -156,12 +157,12 @@ def take_in(
     for (files, table), intakes in groups.items():
         for path in files:
             try:
-                _read(heads[path], table, intakes, factors, ledger)
+                _read(heads[path], table, intakes, factors, ledger, names[path])
             except DataError as error:
                 if len(heads) == 1:
                     raise
                 taken.left_out.append(str(error))
-            taken.notes += [f"{path.name}: {note}" for note in heads[path].account.notes]
+            taken.notes += [f"{names[path]}: {note}" for note in heads[path].account.notes]
     if not any(intake.spool.rows for intake in taken.intakes) and taken.left_out:
         raise DataError(taken.left_out[0])
     return taken
@@ -186,14 +187,19 @@ def time_of(stream: Stream, log: Log, heads: Mapping[Path, LogFile]) -> tuple[Lo
 
 
 def _read(
-    opened: LogFile, table: str | None, intakes: Sequence[Intake], factors: Mapping[str, float], ledger: Ledger
+    opened: LogFile,
+    table: str | None,
+    intakes: Sequence[Intake],
+    factors: Mapping[str, float],
+    ledger: Ledger,
+    shown: str,
 ) -> None:
     stamps = [intake.time.column for intake in intakes if intake.time is not None]
     tests = [column for intake in intakes for column, _ in intake.stream.where]
     wanted = list(dict.fromkeys([*(one for intake in intakes for one in intake.stream.columns.values()), *stamps]))
     name = table_of(opened, table, wanted, tests).name
     for rows in opened.rows(name, list(dict.fromkeys([*wanted, *tests]))):
-        _note(rows, opened.path.name, intakes, ledger)
+        _note(rows, shown, intakes, ledger)
         for intake in intakes:
             intake.take(rows.batch, factors)
     ledger.bad += opened.account.bad

@@ -12,7 +12,7 @@ from vgyro.dataset import Recording
 from vgyro.log import Log, LogArray, Values
 from vgyro.storage.frames import Frames, channel_watches
 from vgyro.storage.integrity import FileRecord, Integrity, Ledger
-from vgyro.storage.logs.files import log_files, open_all
+from vgyro.storage.logs.files import log_files, open_all, shown_names
 from vgyro.storage.logs.intake import Intake, Taken, take_in
 from vgyro.storage.logs.joined import Joined
 from vgyro.storage.logs.placing import Placing
@@ -48,6 +48,7 @@ class LogReader:
         self._files = log_files(self.paths)
         self._heads, self._left_out = open_all(self._files, self.log, self.engine)
         self._streams = streams_of(self._files, self.log, self.board, self.array, self._heads, self._left_out)
+        self._names = shown_names(self._files)
         self._ledger = Ledger()
         self._watches = channel_watches(self.board, rates=self.values == "rates")
 
@@ -65,7 +66,7 @@ class LogReader:
 
     def __iter__(self) -> Iterator[Frames]:
         """Read everything, learn the clocks, then place the rows block by block.  raises : DataError, Refused"""
-        taken = take_in(self._streams, self.log, self.array, self._heads, self._ledger)
+        taken = take_in(self._streams, self.log, self.array, self._heads, self._ledger, self._names)
         self._good, self._end, self._segments = 0, None, 0
         if len(taken.intakes) == 1:
             clocks = [Placing(taken.intakes[0], self.rate_hz, self.board)]
@@ -90,7 +91,7 @@ class LogReader:
         outcome = Outcome(
             board=self.board,
             values=self.values,
-            files=[file_record(path, head, self.paths) for path, head in self._heads.items()],
+            files=[file_record(path, head, self._names[path]) for path, head in self._heads.items()],
             good=self._good,
             repeated=sum(one.repeated for one in clocks),
             end_s=self._end,
@@ -127,17 +128,9 @@ def infinite_notes(intakes: Sequence[Intake]) -> list[str]:
     ]
 
 
-def file_record(path: Path, head: LogFile, paths: Sequence[str | Path]) -> FileRecord:
+def file_record(path: Path, head: LogFile, name: str) -> FileRecord:
     """Name, size and hash of a log."""
     size = path.stat().st_size if path.is_file() else sum(one.stat().st_size for one in path.rglob("*"))
     account = head.account
     digest = account.sha256 or (sha256_of_file(path) if path.is_file() else "")
-    return FileRecord(_shown(path, paths), size, digest, account.compression, account.content_bytes or size)
-
-
-def _shown(path: Path, paths: Sequence[str | Path]) -> str:
-    """The file's name, with the date folders it lies in."""
-    for folder in map(Path, paths):
-        if folder.is_dir() and path != folder and path.is_relative_to(folder):
-            return path.relative_to(folder).as_posix()
-    return path.name
+    return FileRecord(name, size, digest, account.compression, account.content_bytes or size)
