@@ -23,9 +23,7 @@ class TextForm(StrictModel):
     """Form of a text log. What is null is found from its lines."""
 
     encoding: Literal["utf-8", "utf-16", "latin-1"] | None = Field(None, description="null: found")
-    delimiter: str | None = Field(
-        None, min_length=1, description='between columns; " ": any blanks; null: found'
-    )
+    delimiter: str | None = Field(None, min_length=1, description='between columns; " ": any blanks; null: found')
     decimal: Literal[".", ","] | None = Field(None, description="sign before the decimals; null: found")
     header: bool | None = Field(None, description="is the first line one of names? null: found")
     names: tuple[str, ...] = Field((), description="names of the columns of a log without header; empty: c1, c2, …")

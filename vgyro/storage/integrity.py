@@ -197,7 +197,10 @@ class ChannelWatch:
     def record(self) -> ChannelRecord:
         """The channel's entry."""
         return ChannelRecord(
-            self.clipped, self.clipped / self.samples if self.samples else 0.0, self.stuck_start, self.stuck_duration,
+            self.clipped,
+            self.clipped / self.samples if self.samples else 0.0,
+            self.stuck_start,
+            self.stuck_duration,
             self.missing,
         )
 

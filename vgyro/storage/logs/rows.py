@@ -26,8 +26,8 @@ class RowClock:
         self._rate_hz, self._row = rate_hz, 0
         self._damaged = np.asarray(damaged, dtype=np.int64)
 
-    def place(self, stamps: np.ndarray, same: np.ndarray) -> Placed:
-        """Place the next rows; `stamps` says nothing."""
+    def place(self, _: np.ndarray, same: np.ndarray) -> Placed:
+        """Place the next rows; their stamps say nothing."""
         rows = np.arange(self._row, self._row + len(same))
         self._row += len(same)
         lost = np.searchsorted(self._damaged, rows, side="right")
