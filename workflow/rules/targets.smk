@@ -80,7 +80,11 @@ def everything(wildcards):
 def everything_of_one(wildcards):
     """Every artefact and page of the data set that the command line names."""
     name = config["only"]
-    return [f"reports/{name}.html", f"results/{name}/headline.json", *everything_of([name])]
+    return [
+        f"reports/{name}.html",
+        f"results/{name}/headline.json",
+        *everything_of([name]),
+    ]
 
 
 def pages_made():
