@@ -12,8 +12,13 @@ import pyarrow.parquet as pq
 
 from benchmarks.contest import Accuracy, Contest, Rival, Side
 from benchmarks.limits import arithmetic
+from vgyro.config import IntegrityOptions
+from vgyro.dataset import Manifest, array_board
 from vgyro.log import TextForm
+from vgyro.storage import open_recording
 from vgyro.storage.logs.text import open_log
+from vgyro.storage.tables import Provenance
+from vgyro.tasks.decode import decode
 
 GYROS = 6
 NAMES = ("t", *(f"g{gyro}" for gyro in range(1, GYROS + 1)))
@@ -57,6 +62,10 @@ def contests(quick: bool) -> list[Contest]:
             (Rival(theirs, TARGET),), limit, accuracy, "ours hashes the file, too, and compresses with zstd",
         ),
         Contest(
+            "log_frames", f"{title} to frames.parquet", "byte", Side("vgyro", lambda: to_frames(path, made), size),
+            (Rival(theirs),), limit, accuracy, "the stage decode as a whole, with clock and gaps",
+        ),
+        Contest(
             "log_read", f"{title} to columns", "byte", Side("vgyro", lambda: read(path), size), (Rival(reading),),
             limit, accuracy, "ours finds the form and hashes the file, too",
         ),
@@ -91,3 +100,14 @@ def to_parquet(path: Path, made: Path) -> None:
     ) as writer:
         for rows in open_log(path, TextForm()).rows("", NAMES):
             writer.write_batch(rows.batch)
+
+
+def to_frames(path: Path, made: Path) -> None:
+    """What the stage decode does with the log."""
+    gyros = [{"name": name, "axis": "z", "unit": "deg/s"} for name in NAMES[1:]]
+    record = {"name": "log", "kind": "free", "files": str(path), "log": {"time": {"column": "t", "unit": "s"}}}
+    manifest = Manifest.model_validate({"array": {"gyros": gyros}, "recordings": [record]})
+    board = array_board(manifest, "log")
+    assert board is not None
+    reader = open_recording([path], manifest.recordings[0], board, IntegrityOptions(), array=manifest.array)
+    decode(reader, made, Provenance({}, "", ""), {})

@@ -30,7 +30,7 @@ def test_a_quick_run_of_all_contests(tmp_path: Path) -> None:
     results = {result["name"]: result for result in record["results"]}
     assert set(results) == {
         "garch", "dcc", "dcc_stderr", "weights", "kalman", "rts", "fusion", "allan", "welch", "decode", "log",
-        "log_read", "import",
+        "log_frames", "log_read", "import",
     }  # fmt: skip
     for result in results.values():
         assert result["accurate"], result
