@@ -24,7 +24,8 @@ from vgyro.storage.decode import open_recording
 from vgyro.storage.frames import gather
 from vgyro.storage.inputs import read_board
 from vgyro.storage.integrity import Integrity
-from vgyro.storage.logs.names import bare_name
+from vgyro.storage.logs.names import bare_name, is_called_time
+from vgyro.storage.logs.roles import Roles
 
 LARGEST_LOOKED_AT = 400 << 20
 MOVES = 0.02
@@ -150,12 +151,19 @@ def _logs(options: argparse.Namespace, folder: Path, names: Sequence[str]) -> Fo
         ]
     for draft in drafts:
         if draft.log is not None and draft.log.time is None and options.rate is None:
-            what = "has no column of time stamps, so its rate is not known"
+            still = _times_that_stand(looks[0].sources[0].roles)
+            what = f"has no column of time stamps{still}, so its rate is not known"
             raise UsageError(what, str(options.files[0]), "give it: --rate HZ")
     found = Found(array, _board_of(array, drafts), drafts, [], list(_array_lines(looks, array, together)))
     for draft in drafts:
         found.lines += _surveyed(found, draft, folder, options.kind)
     return found
+
+
+def _times_that_stand(roles: Roles) -> str:
+    """A phrase on columns that are called times and are none; "" without."""
+    names = [name for name, kind in roles.other.items() if kind == "other" and is_called_time(name)]
+    return f" ({', '.join(names)}: does not go up)" if names else ""
 
 
 def _first_file(path: Path) -> Path:

@@ -19,6 +19,10 @@ from vgyro.storage.logs.roles import GyroGuess, Roles, roles_of
 from vgyro.storage.logs.table import LogFile, LogTable
 
 HEAD_ROWS = 20_000
+FEWEST_ROWS = 10
+"""With fewer rows nothing can be told from values."""
+OF_LIBRARIES = re.compile(r" \(\w*(?:Error|Invalid|Exception|Warning)\b.*\)$")
+"""What a library says of a damaged file, behind our own words."""
 SAME_LENGTH = 0.05
 NOT_RAW = re.compile(r"combined|vehicle|estimat|setpoint|status|control|fused|filtered|odom", re.IGNORECASE)
 
@@ -53,19 +57,52 @@ class Look:
 
 def look_at(path: Path) -> Look:
     """Open a log and guess the role of every column.  raises : DataError if it is no log, or holds no gyro"""
-    opened = open_log(path, Log())
-    found = []
+    opened = open_plainly(path)
+    gyros: list[tuple[LogTable, Roles]] = []
+    fewest = {}
     for table in opened.tables:
-        found.append((table, roles_of(table.columns, head_of(opened, table), table.name or path.stem)))
-    gyros = [(table, roles) for table, roles in found if roles.gyros]
+        head = head_of(opened, table)
+        if (rows := len(head[table.columns[0].name])) < FEWEST_ROWS:
+            fewest[table.name] = rows
+            continue
+        roles = roles_of(table.columns, head, table.name or path.stem)
+        if roles.gyros:
+            gyros.append((table, roles))
+    if not gyros and len(fewest) == len(opened.tables):
+        rows = max(fewest.values())
+        what = f"holds {rows} row{'s' * (rows != 1)} of numbers, too few to tell its columns apart"
+        raise DataError(what, str(path), f"give a log of {FEWEST_ROWS} rows or more")
     if not gyros:
         there = "; ".join(_columns(table) for table in opened.tables)
         remedy = "name its columns in the manifest, under `array` (docs/logs.md)"
         raise DataError(f"no column looks like a gyro's: {there or 'no columns of numbers'}", str(path), remedy)
     chosen = _alike(gyros)
+    _check_values(path, opened, chosen)
     sources = [Source(table, roles, one) for table, roles in chosen for one in (roles.ids or (None,))]
     taken = {table.name for table, _ in chosen}
     return Look(path, opened, tuple(sources), tuple(table.name for table, _ in gyros if table.name not in taken))
+
+
+def open_plainly(path: Path) -> LogFile:
+    """Open a log.  raises : DataError in our own words, without those of the library that reads it"""
+    try:
+        return open_log(path, Log())
+    except DataError as error:
+        raise DataError(
+            OF_LIBRARIES.sub(": it is damaged or cut short", error.what), error.where, error.remedy
+        ) from None
+
+
+def _check_values(path: Path, opened: LogFile, chosen: Sequence[tuple[LogTable, Roles]]) -> None:
+    """raises : DataError if no gyro has a value in the first rows"""
+    for table, roles in chosen:
+        head = head_of(opened, table)
+        if any(np.isfinite(head[gyro.column].astype(np.float64)).any() for gyro in roles.gyros):
+            return
+    names = ", ".join(gyro.column for gyro in chosen[0][1].gyros)
+    rows = len(head[table.columns[0].name])
+    what = f"its gyros ({names}) have no value in the first {rows} rows: empty, NaN or infinite"
+    raise DataError(what, str(path), "check what the logger wrote, or cut these rows off")
 
 
 def _columns(table: LogTable) -> str:

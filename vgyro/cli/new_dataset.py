@@ -155,7 +155,10 @@ def _must_exist(path: Path) -> None:
     from vgyro.errors import DataError
     from vgyro.storage.sources import check_exists
 
-    check_exists(path)
+    try:
+        check_exists(path)
+    except DataError as error:
+        raise DataError(error.what, error.where, "check the path") from None
     if path.is_dir() and not any(one.is_file() for one in path.rglob("*")):
         raise DataError("is an empty folder", str(path), "name a file, or a folder of logs")
 

@@ -9,14 +9,15 @@ import numpy as np
 import pyarrow as pa
 
 from vgyro.board import Board
-from vgyro.cli.looking import HEAD_ROWS, head_of
+from vgyro.cli.looking import HEAD_ROWS, head_of, open_plainly
 from vgyro.cli.manifest_text import LogDraft
 from vgyro.errors import DataError
-from vgyro.log import Log
 from vgyro.storage.frames import gyro_rails
 from vgyro.storage.inputs import files_inside, read_board
 from vgyro.storage.layout import kept_channels
-from vgyro.storage.logs.families import family_of, open_log
+from vgyro.storage.logs.families import HEAD, family_of
+from vgyro.storage.logs.refused import NOT_A_LOG
+from vgyro.storage.logs.refused import named as refused
 from vgyro.storage.logs.roles import roles_of
 from vgyro.storage.logs.table import LogFile, LogTable
 from vgyro.storage.sniff import all_boards, sniff
@@ -42,6 +43,11 @@ def is_dump(path: Path, boards: Path, named: Board | None = None) -> bool:
         found = sniff(path, known)
         if found and found[0].good_share >= ENOUGH:
             return True
+        with open(path, "rb") as file:
+            kind = refused(file.read(HEAD))
+        if kind is not None:
+            remedy = "name a dump or a log" if kind.remedy == NOT_A_LOG else kind.remedy
+            raise DataError(f"is {kind.what}, neither a dump nor a log", str(path), remedy) from None
         best = f"; the nearest, {found[0].board}, explains {found[0].good_share:.0%} of it" if found else ""
         remedy = "name the board by --board, or describe it (docs/extending.md)"
         fits = f"no board of {boards} fits" if named is None else f"board {named.name} does not fit"
@@ -127,7 +133,7 @@ def _fractions(values: np.ndarray) -> bool:
 
 def opened_log(path: Path) -> LogFile:
     """A log, or the first one of a folder."""
-    return open_log(files_inside(path)[0] if path.is_dir() else path, Log())
+    return open_plainly(files_inside(path)[0] if path.is_dir() else path)
 
 
 def log_draft(path: Path, board: Board) -> LogDraft:

@@ -242,6 +242,14 @@ def test_of_six_columns_without_names_those_of_gravity_are_left():
     assert [gyro.column for gyro in plain(**columns).gyros] == ["c4", "c5", "c6"]
 
 
+def test_constants_and_other_quantities_are_no_gyros():
+    # The standard deviation of many 3.3 is not exactly 0.
+    noise = np.random.default_rng(1).standard_normal(ROWS)
+    roles = plain(t=np.arange(ROWS) / 100, c2=np.full(ROWS, 3.3), volts=noise, battery=3.7 + noise)
+    assert not roles.gyros
+    assert [gyro.column for gyro in plain(t=np.arange(ROWS) / 100, c2=noise, volts=noise).gyros] == ["c2"]
+
+
 @pytest.mark.parametrize(("about", "gyros"), [
     ("Accelerometer", 0), ("linear_acceleration", 0), ("TotalAcceleration", 0), ("Magnetometer", 0), ("Gyroscope", 3),
     ("run3", 3), ("tmp", 3), ("sensor_accel", 0), ("sensor_gyro", 3),

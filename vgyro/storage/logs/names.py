@@ -61,7 +61,11 @@ SENSORS: dict[Kind, tuple[str, ...]] = {
 }  # fmt: skip
 """Of several the one that ends last tells; of those that end together, the first: angular velocity is no angle."""
 FORMS = {kind: re.compile(rf"\b(?:{'|'.join(forms)})\b") for kind, forms in SENSORS.items()}
-MOVING = re.compile(r"vel(ocity)?|speed|pos(ition)?|lat(itude)?|lon(gitude)?")
+OTHERS = re.compile(
+    r"vel(ocity)?|speed|pos(ition)?|lat(itude)?|lon(gitude)?|hdop|volts?|voltage|current|amps?|battery|vbat|power"
+    r"|rssi|lux|light|steps|distance|range|rpm|motor|servo|throttle|pwm"
+)
+"""Words of quantities that are none of a gyro, where no word of a sensor stands beside them."""
 SHORT: tuple[tuple[Kind, str], ...] = (
     ("acceleration", r"a\d*"),
     ("magnetic field", r"m\d*"),
@@ -135,7 +139,7 @@ def sensor_of(words: Sequence[str]) -> Kind | None:
             best = end, kind
     if best is not None:
         return best[1]
-    return "other" if any(MOVING.fullmatch(word) for word in words) else None
+    return "other" if any(OTHERS.fullmatch(word) for word in words) else None
 
 
 def short_kinds(words: Sequence[str]) -> list[Kind]:
@@ -149,6 +153,12 @@ def short_kinds(words: Sequence[str]) -> list[Kind]:
 def says_time(words: Sequence[str]) -> bool:
     """Does a name say that the column is a time?"""
     return any(TIMES.fullmatch(word) for word in words)
+
+
+def is_called_time(name: str) -> bool:
+    """Is a column called a time, by a word that may be short?"""
+    words = words_of(name)
+    return says_time(words) or "time" in short_kinds(words)
 
 
 def axis_of(name: str) -> str:

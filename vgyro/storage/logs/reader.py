@@ -11,7 +11,7 @@ from vgyro.config import IntegrityOptions
 from vgyro.dataset import Recording
 from vgyro.log import Log, LogArray, Values
 from vgyro.storage.frames import Frames, channel_watches
-from vgyro.storage.integrity import FileRecord, Integrity, Ledger
+from vgyro.storage.integrity import FileRecord, Integrity, Ledger, Refused
 from vgyro.storage.logs.files import log_files, open_all, shown_names
 from vgyro.storage.logs.intake import Intake, Taken, take_in
 from vgyro.storage.logs.joined import Joined
@@ -116,7 +116,18 @@ class LogReader:
         if reasons:
             status = "suspect" if self.integrity.status == "good" else self.integrity.status
             self.integrity = replace(self.integrity, status=status, reasons=[*self.integrity.reasons, *reasons])
+        if not self._good:
+            raise no_value(self.integrity, self.board, where)
         refuse_if_needed(self.integrity, self.options, where, lambda: "check `log` and `rate_hz` in the manifest")
+
+
+def no_value(record: Integrity, board: Board, where: str) -> Refused:
+    """The error for a log none of whose rows holds a value of a gyro."""
+    gyros = ", ".join(gyro.name for gyro in board.gyros)
+    what = f"no row has a value of a gyro ({gyros}): {record.frames.bad} are empty, NaN or infinite"
+    error = Refused(record, what, where, "check the columns in the manifest, and what the logger wrote")
+    error.integrity = replace(record, status="refused", reasons=[str(error), *record.reasons])
+    return error
 
 
 def infinite_notes(intakes: Sequence[Intake]) -> list[str]:

@@ -185,7 +185,7 @@ def _nameless(columns: Sequence[LogColumn], head: Mapping[str, np.ndarray], kind
             kinds[column.name] == "other"
             and sensor_of(words_of(column.name)) is None
             and unit_in(column.name, column.unit) not in {*UNITS, *TIME_UNITS}
-            and np.nanstd(values) > 0
+            and varies(values)
             and not advances(values)
         ):
             kinds[column.name] = "gyro"
@@ -254,6 +254,12 @@ def noise_of(values: np.ndarray) -> float:
         return 0.0
     usual = float(np.median(steps)) / 0.6745
     return (usual or float(np.sqrt(np.mean(steps**2)))) / np.sqrt(2.0)
+
+
+def varies(values: np.ndarray) -> bool:
+    """Are not all the values one?"""
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.max() > known.min())
 
 
 def advances(values: np.ndarray) -> bool:
