@@ -1,4 +1,4 @@
-"""Tests of alignment; clock_cases.py, beside this file, is no package."""
+"""Tests of alignment; moving_arrays.py, beside this file, is no package."""
 
 import sys
 from pathlib import Path

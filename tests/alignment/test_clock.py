@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from clock_cases import NOISE, Motion, Recorded, random_motion, record
+from moving_arrays import NOISE, Motion, Recorded, random_motion, record
 
 from vgyro.alignment import (
     AMBIGUOUS,

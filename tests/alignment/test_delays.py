@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from clock_cases import board, random_motion
+from moving_arrays import board, random_motion
 
 from vgyro.alignment import relative_delays
 from vgyro.alignment.delays import FOUND, NO_MOTION, TOO_FEW

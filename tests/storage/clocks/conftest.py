@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from clock_cases import LOGS
+from stamps import LOGS
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from clock_cases import run
+from stamps import run
 
 K = np.arange(20_000)
 

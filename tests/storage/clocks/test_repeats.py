@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from clock_cases import run, same_as_before
+from stamps import run, same_as_before
 
 from vgyro.storage.clocks.repeats import Keeper, KeepRule, _held, keep_rule
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from clock_cases import run
+from stamps import run
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from clock_cases import run
+from stamps import run
 
 from vgyro.errors import DataError
 from vgyro.storage.clocks.unfold import INT_LIMIT, LATEST_S, Unfolder, UnfoldRule, spikes, usable
