@@ -70,6 +70,8 @@ def run(options: argparse.Namespace) -> int:
             print(text, file=sys.stderr)
         elif not loaded.datasets:
             print(f"nothing wrong, and no data set in {options.raw}; start one with vgyro new-dataset")
+        elif warnings:
+            print(f"no mistake, {len(warnings)} warning{'s' * (len(warnings) != 1)}")
         else:
             print("nothing wrong")
     return ConfigError.exit_code if problems else 0
