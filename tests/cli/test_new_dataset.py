@@ -356,6 +356,11 @@ def test_files_are_one_array_where_they_are_about_as_long(project, three_files, 
     assert len(written(project).recordings) == recordings
 
 
+def test_scale_and_unit_exclude_each_other(project, vgyro):
+    path = text_log(project / "a.csv", COUNTS)
+    assert vgyro("new-dataset", path, "--scale", "1/131", "--unit", "deg/s").code == 2
+
+
 def test_together_and_separate_exclude_each_other(three_files, vgyro):
     assert vgyro("new-dataset", *three_files, "--together", "--separate").code == 2
 

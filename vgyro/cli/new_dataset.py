@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser, files: str = "+") -> None:
     parser.add_argument(
         "--scale", type=_ratio, metavar="DEG_S", help="deg/s a count of a log's gyros: 0.00875, or 1/131"
     )
-    parser.add_argument("--unit", choices=("deg/s", "rad/s", "mdps", "deg/h"), help="unit of a log's gyros")
+    known.add_argument("--unit", choices=("deg/s", "rad/s", "mdps", "deg/h"), help="unit of a log's gyros")
     parser.add_argument("--axis", metavar="NAME", help="axis of all gyros of a log; default: by their names, else z")
     both = parser.add_mutually_exclusive_group()
     both.add_argument(
