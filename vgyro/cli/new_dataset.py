@@ -51,7 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser, files: str = "+") -> None:
         "--board", help="board in config/boards, or path of a board file; default: the one that fits best"
     )
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second, for files without time stamps")
-    parser.add_argument(
+    known = parser.add_mutually_exclusive_group()
+    known.add_argument(
         "--scale", type=_ratio, metavar="DEG_S", help="deg/s a count of a log's gyros: 0.00875, or 1/131"
     )
     known.add_argument("--unit", choices=("deg/s", "rad/s", "mdps", "deg/h"), help="unit of a log's gyros")
