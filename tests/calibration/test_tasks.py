@@ -52,7 +52,7 @@ def calibration_run(name: str = "calibration", reference: dict | None = None) ->
 
 def write_frames(folder: Path, columns: dict[str, np.ndarray], status: str = "good") -> Path:
     write_table(folder / "frames.parquet", columns, "frames", NOWHERE)
-    write_json(folder / "integrity.json", {"status": status, "rate_hz": RATE_HZ})
+    write_json(folder / "integrity.json", {"status": status, "rate_hz": RATE_HZ, "clocks": []})
     return folder / "frames.parquet"
 
 
@@ -243,7 +243,7 @@ def test_the_rate_is_that_of_the_integrity_record(tmp_path: Path, board: Board):
     record = manifest({"name": "static", "kind": "static", "files": "x.bin"})
     uncalibrated(tmp_path, board, record)
     frames = write_frames(tmp_path / "frames", counts_of(board, np.zeros(1000)))
-    write_json(tmp_path / "frames" / "integrity.json", {"status": "good", "rate_hz": 99.3})
+    write_json(tmp_path / "frames" / "integrity.json", {"status": "good", "rate_hz": 99.3, "clocks": []})
     run_convert(tmp_path, board, record, "static", frames)
     assert read_metadata(tmp_path / "static.parquet")["rate_hz"] == 99.3
 

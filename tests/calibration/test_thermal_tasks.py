@@ -47,7 +47,10 @@ class Lab:
             narrow = {name: values.astype(np.int16) for name, values in simulated.counts.items()}
             columns = {"time": simulated.time, "segment": segment, **narrow}
             write_table(folder / recording.name / "frames.parquet", columns, "frames", NOWHERE)
-            write_json(folder / recording.name / "integrity.json", {"status": "good", "rate_hz": self.board.rate_hz})
+            write_json(
+                folder / recording.name / "integrity.json",
+                {"status": "good", "rate_hz": self.board.rate_hz, "clocks": []},
+            )
 
     def calibrate(self, name: str = "calibration.json", drop: tuple[str, ...] = (), **options: str) -> dict:
         """calibration.json from all recordings but some."""

@@ -63,7 +63,7 @@ class Chain:
         columns |= {} if celsius is None else {"t": celsius.astype(np.float32)}
         write_table(self.folder / "frames.parquet", columns, "frames", Provenance({}, "", ""))
         row = {"source": "nominal", "scale": 1.0, "bias": 0.0, "temperature": None}
-        write_json(self.folder / "integrity.json", {"rate_hz": RATE_HZ})
+        write_json(self.folder / "integrity.json", {"rate_hz": RATE_HZ, "clocks": []})
         write_json(self.folder / "calibration.json", {"gyros": dict.fromkeys(self.gyros, row)})
 
     def all(self) -> None:

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from task_chain import RATE_HZ, SIGMA, Chain
 
+from vgyro.board import Board
 from vgyro.tasks import convert, faults, fuse, noise
+from vgyro.tasks.delays import Lateness, noise_left
 
 GYROS = ("g1", "g2", "g3", "g4")
 SECONDS = 120
@@ -70,3 +72,18 @@ def test_what_is_late_at_the_end_has_no_value_there(tmp_path):
 def test_at_rest_there_is_no_delay_to_find(tmp_path):
     _, chain = fused(tmp_path / "rest", LATE_S, kind="static")
     assert chain.metadata("rates")["delays"] == {}
+
+
+def test_what_is_left_of_the_noise_is_written_down(tmp_path):
+    _, chain = fused(tmp_path / "late", LATE_S)
+    metadata = chain.metadata("rates")
+    assert list(metadata["noise_gain"]) == ["g2"]
+    assert metadata["noise_gain"]["g2"] == metadata["delays"]["z"]["gyros"]["g2"]["noise_gain"] < 1
+    record = {
+        "clocks": [{"alignment": {}, "channels": ["g1"]}, {"alignment": {"noise_gain": 0.97}, "channels": ["g3"]}]
+    }
+    board = Board.model_validate(chain.board)
+    assert noise_left(board, record, Lateness(metadata["delays"])) == {
+        "noise_gain": {"g2": metadata["noise_gain"]["g2"], "g3": 0.97}
+    }
+    assert noise_left(board, {"clocks": []}, Lateness()) == {}

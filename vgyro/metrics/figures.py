@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from vgyro.figure import Figure
@@ -15,6 +16,17 @@ class Reading:
     low: float
     high: float
     note: str = ""
+
+
+def without_interpolation(sigma: Reading, gain: float) -> Reading:
+    """1σ of an interpolated series as it is without: over the root of what is left of the variance of its noise.
+
+    For noise that is white; gain: of vgyro.alignment.noise_gain, 1 for a series that was not interpolated.
+    """
+    share = math.sqrt(gain)
+    note = f"of samples before the interpolation that brought the gyro to the others' time, which left {gain:.3f} of it"
+    joined = f"{sigma.note}; {note}" if sigma.note else note
+    return Reading(sigma.value / share, sigma.low / share, sigma.high / share, joined)
 
 
 FIGURES: dict[str, Figure] = {

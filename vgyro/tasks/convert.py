@@ -28,7 +28,7 @@ from vgyro.storage.frames import gyro_rails
 from vgyro.storage.tables import TableWriter, read_batches, read_column, read_json
 from vgyro.tasks.block_means import between, block_means
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.delays import lateness
+from vgyro.tasks.delays import lateness, noise_left
 from vgyro.tasks.moves import moves_of
 from vgyro.tasks.reference_log import read_reference
 
@@ -45,7 +45,8 @@ def main(task: Task) -> None:
     recording = manifest.recording(task.options["recording"])
     frames = task.input("frames")
     time = read_column(frames, "time")
-    rate_hz = float(read_json(task.input("integrity"))["rate_hz"])
+    integrity = read_json(task.input("integrity"))
+    rate_hz = float(integrity["rate_hz"])
     converter = Converter(
         board, recording, read_json(task.input("calibration"))["gyros"], values_of(manifest, recording)
     )
@@ -63,6 +64,7 @@ def main(task: Task) -> None:
     reference = reference_of(converter, frames, time, task.inputs.get("reference", []))
     late = lateness(converter, frames, rate_hz)
     extra = {"rate_hz": rate_hz, **converter.about(clipped), **missing_record(frames, board), "delays": late.record}
+    extra |= noise_left(board, integrity, late)
     if late.rates:
         # Between its samples a late gyro has no value at the ends and beside a missing one.
         extra["missing"] = missing_of(extra.get("missing", {}), late.rates)

@@ -63,6 +63,23 @@ def lateness(converter: HasRates, frames: Path, rate_hz: float) -> Lateness:
     return Lateness(record, rates)
 
 
+def noise_left(board: Board, integrity: Mapping[str, Any], late: Lateness) -> dict[str, dict[str, float]]:
+    """Metadata of the gyros that were interpolated, noise_gain: gyro → what is left of the variance of white noise.
+
+    By the joining of clocks (integrity.json) and by a delay that was taken out; empty where no gyro was interpolated.
+    """
+    by_clock = {
+        channel: float(clock["alignment"]["noise_gain"])
+        for clock in integrity["clocks"]
+        if clock["alignment"]
+        for channel in clock["channels"]
+    }
+    by_delay = {name: one["noise_gain"] for found in late.record.values() for name, one in found["gyros"].items()}
+    gains = {gyro.name: by_clock.get(gyro.field, 1.0) * by_delay.get(gyro.name, 1.0) for gyro in board.gyros}
+    found = {name: gain for name, gain in gains.items() if gain < 1.0}
+    return {"noise_gain": found} if found else {}
+
+
 def _entry(found: Delays, place: int, gain: float) -> dict[str, Any]:
     """One gyro in the metadata; null where nothing was found."""
     limits = {"delay_s": found.delay_s, "low_s": found.low, "high_s": found.high}

@@ -29,6 +29,7 @@ from vgyro.metrics import (
     run_back,
 )
 from vgyro.metrics.dynamic_figures import dynamic_figures
+from vgyro.metrics.figures import without_interpolation
 from vgyro.storage.tables import read_column, read_columns, read_metadata
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.measure_missing import Lacking, own_moving, own_still, with_own
@@ -165,8 +166,11 @@ def still_figures(
     measured = with_own(measured, {place: one for place, (one, _) in alone.items()})
     own, singles = {place: row for place, (_, row) in alone.items()}, len(lacking.gyros)
     figures = array_figures(shared, measured, singles, own)
-    clipped = read_metadata(frame.path).get("clipped", {})
+    metadata = read_metadata(frame.path)
+    clipped, gains = metadata.get("clipped", {}), metadata.get("noise_gain", {})
     for one, row in zip(series[:singles], figures.readings, strict=False):
+        if one.column in gains and "sigma" in row:
+            row["sigma"] = without_interpolation(row["sigma"], gains[one.column])
         if one.column in clipped:
             row["clipped"] = counted(int(clipped[one.column]))
     return Still(true_rate, where, shared, measured, own, figures)
