@@ -38,7 +38,7 @@ WRONG = {
     "power.csv": ("t,volts,amps\n" + rows(lambda k: f"{k / 100},3.3,{k}"), "t, volts, amps", "array"),
     "noise.bin": (RNG.bytes(5000), "no log that vgyro reads (it begins", "text with columns"),
     "half.csv.gz": (gzip.compress(b"")[:-4], "no whole block of gzip", "copy it again"),
-    "cut.parquet": (b"PAR1" + RNG.bytes(100), "is not a readable Parquet file: it is damaged", "copy it again"),
+    "cut.parquet": (b"PAR1" + RNG.bytes(100), "is not a readable Parquet file: damaged", "copy it again"),
     "cut.ulg": (b"ULog\x01\x12\x35\x01" + RNG.bytes(200), "holds no table of numbers", "closed properly"),
     "cut.bag": (b"#ROSBAG V2.0\n" + RNG.bytes(200), "is not a readable ROS bag", "copy it again"),
     "cut.mcap": (b"\x89MCAP0\r\n" + RNG.bytes(100), "MCAP file without a header", "copy it again"),

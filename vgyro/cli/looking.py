@@ -21,8 +21,6 @@ from vgyro.storage.logs.table import LogFile, LogTable
 HEAD_ROWS = 20_000
 FEWEST_ROWS = 10
 """With fewer rows nothing can be told from values."""
-OF_LIBRARIES = re.compile(r" \(\w*(?:Error|Invalid|Exception|Warning)\b.*\)$")
-"""What a library says of a damaged file, behind our own words."""
 SAME_LENGTH = 0.05
 NOT_RAW = re.compile(r"combined|vehicle|estimat|setpoint|status|control|fused|filtered|odom", re.IGNORECASE)
 
@@ -57,7 +55,7 @@ class Look:
 
 def look_at(path: Path) -> Look:
     """Open a log and guess the role of every column.  raises : DataError if it is no log, or holds no gyro"""
-    opened = open_plainly(path)
+    opened = open_log(path, Log())
     gyros: list[tuple[LogTable, Roles]] = []
     fewest = {}
     for table in opened.tables:
@@ -81,16 +79,6 @@ def look_at(path: Path) -> Look:
     sources = [Source(table, roles, one) for table, roles in chosen for one in (roles.ids or (None,))]
     taken = {table.name for table, _ in chosen}
     return Look(path, opened, tuple(sources), tuple(table.name for table, _ in gyros if table.name not in taken))
-
-
-def open_plainly(path: Path) -> LogFile:
-    """Open a log.  raises : DataError in our own words, without those of the library that reads it"""
-    try:
-        return open_log(path, Log())
-    except DataError as error:
-        raise DataError(
-            OF_LIBRARIES.sub(": it is damaged or cut short", error.what), error.where, error.remedy
-        ) from None
 
 
 def _check_values(path: Path, opened: LogFile, chosen: Sequence[tuple[LogTable, Roles]]) -> None:

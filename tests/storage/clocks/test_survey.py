@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from stamps import run
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from stamps import run
 
 from vgyro.errors import DataError
 from vgyro.storage.clocks import ClockOptions, survey

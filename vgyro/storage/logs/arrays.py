@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.opened import WIDEST, Unique, batch_of, rows_at_a_time
+from vgyro.storage.logs.opened import WIDEST, Damaged, Unique, batch_of, rows_at_a_time
 from vgyro.storage.logs.table import Kind, LogColumn, LogTable, Rows
 
 Take = Callable[[np.ndarray], np.ndarray]
@@ -140,7 +140,7 @@ def stream(leaves: Sequence[Leaf]) -> Iterator[Rows]:
 def arrow(values: np.ndarray) -> pa.Array:
     """A column [n] as Arrow: dates and durations as ns, truth as 0 and 1, long doubles as doubles.
 
-    raises : ValueError for a date that ns since 1970 cannot hold, and for complex numbers
+    raises : Damaged for a date that ns since 1970 cannot hold, and for complex numbers
     """
     kind = values.dtype.kind
     if kind in "Mm":
@@ -154,7 +154,7 @@ def arrow(values: np.ndarray) -> pa.Array:
     elif kind == "f" and values.dtype.itemsize not in (4, 8):
         values = values.astype(np.float32 if values.dtype.itemsize == 2 else np.float64)
     elif kind not in "iuf":
-        raise ValueError(f"{values.dtype} are no plain numbers")
+        raise Damaged(f"{values.dtype} are no plain numbers")
     return pa.array(np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("=")), from_pandas=False)
 
 
@@ -162,15 +162,15 @@ def _ns(values: np.ndarray) -> pa.Array:
     missing = np.isnat(values)
     unit, _ = np.datetime_data(values.dtype)
     if unit == "generic":
-        raise ValueError("times without a unit")
+        raise Damaged("times without a unit")
     if values.dtype.kind == "M":
         days = values[~missing].astype("M8[D]")
         if len(days) and (days.min() < DAYS[0] or days.max() > DAYS[1]):
-            raise ValueError("dates outside the years 1678 to 2262")
+            raise Damaged("dates outside the years 1678 to 2262")
         values = values.astype("M8[ns]")
     else:
         seconds = values[~missing].astype("m8[s]").astype(np.int64)
         if len(seconds) and np.abs(seconds).max() > 9 * 10**9:
-            raise ValueError("durations of more than 285 years")
+            raise Damaged("durations of more than 285 years")
         values = values.astype("m8[ns]")
     return pa.array(values.astype(np.int64), mask=missing)

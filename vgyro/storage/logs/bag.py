@@ -16,8 +16,9 @@ import pyarrow as pa
 
 from vgyro.storage.logs.bag_fields import ARRAY, Leaf, has_sequences, leaves_of
 from vgyro.storage.logs.bag_files import MCAP, ROS1, check_profile, kind_of, readable, whole_mcap
-from vgyro.storage.logs.opened import (
+from vgyro.storage.logs.opened import (  # fmt: skip
     DAMAGE,
+    Damaged,
     Errors,
     OpenedLog,
     Unique,
@@ -27,7 +28,7 @@ from vgyro.storage.logs.opened import (
     reading,
     reason,
     until_damage,
-)  # fmt: skip
+)
 from vgyro.storage.logs.table import Account, BadLine, LogColumn, LogTable, Rows
 
 MESSAGES = 1 << 15
@@ -154,7 +155,7 @@ def _store(connection: Any, ros1: bool) -> Any:
     if definition.format == Format.NONE:
         store = get_typestore(Stores.LATEST)
         if msgtype not in store.fielddefs:
-            raise ValueError("the bag does not say what the message holds")
+            raise Damaged("the bag does not say what the message holds")
         return store
     types: dict[str, Any] = {}
     if definition.format == Format.MSG:
@@ -168,7 +169,7 @@ def _store(connection: Any, ros1: bool) -> Any:
     for _, fields in types.values():
         for _, (node, inner) in fields:
             if node == ARRAY and inner[1] > LONGEST_ARRAY:
-                raise ValueError(f"an array of {inner[1]} values in every message")
+                raise Damaged(f"an array of {inner[1]} values in every message")
     store = get_typestore(Stores.EMPTY)
     store.register(types)
     has_sequences(msgtype, store.fielddefs)
@@ -176,7 +177,7 @@ def _store(connection: Any, ros1: bool) -> Any:
     if digest and digest != "*":
         found = store.generate_msgdef(msgtype)[1] if ros1 else store.hash_rihs01(msgtype)
         if found != digest:
-            raise ValueError("its definition does not fit its checksum")
+            raise Damaged("its definition does not fit its checksum")
     return store
 
 
@@ -223,5 +224,5 @@ def _stream(path: Path, kind: bytes, topic: Topic, columns: Sequence[str], opene
 
 def _checked(time: int) -> int:
     if not 0 <= time < 1 << 63:
-        raise ValueError(f"a time of {time} ns")
+        raise Damaged(f"a time of {time} ns")
     return time

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from vgyro.storage.logs.opened import Unique
+from vgyro.storage.logs.opened import Damaged, Unique
 from vgyro.storage.logs.table import Kind, LogColumn
 
 Take = Callable[[Any], Any]
@@ -65,7 +65,7 @@ def leaves_of(msgtype: str, fields: Fields, example: Any) -> list[Leaf]:
 def has_sequences(msgtype: str, fields: Fields, depth: int = 0) -> bool:
     """Does the type hold arrays of any length?"""
     if depth > DEEPEST:
-        raise ValueError(f"message types nested more than {DEEPEST} deep")
+        raise Damaged(f"message types nested more than {DEEPEST} deep")
     for _, (node, inner) in fields[msgtype][1]:
         if node == NAME:
             if has_sequences(inner, fields, depth + 1):
@@ -82,7 +82,7 @@ def _walk(
     msgtype: str, fields: Fields, prefix: str, example: Any, unit: str, depth: int
 ) -> Iterator[tuple[str, Kind, str, Take, pa.DataType]]:
     if depth > DEEPEST:
-        raise ValueError(f"message types nested more than {DEEPEST} deep")
+        raise Damaged(f"message types nested more than {DEEPEST} deep")
     for name, (node, inner) in fields[msgtype][1]:
         if name == PLACEHOLDER:
             continue

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.opened import BoundedFile
+from vgyro.storage.logs.opened import BoundedFile, Damaged
 
 ROS1, MCAP, SQLITE = b"#ROSBAG V2.0", b"\x89MCAP0\r\n", b"SQLite format 3\0"
 FOOTER = b"\x02" + struct.pack("<QQQI", 20, 0, 0, 0) + MCAP
@@ -51,7 +51,7 @@ class _Tailed(io.RawIOBase):
     def seek(self, offset: int, whence: int = 0, /) -> int:
         start = (0, self._place, self._length + len(self._tail))[whence]
         if start + offset < 0:
-            raise ValueError("a place before the beginning")
+            raise Damaged("a place before the beginning")
         self._place = start + offset
         return self._place
 

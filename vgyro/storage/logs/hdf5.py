@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vgyro.storage.logs.arrays import Variable
-from vgyro.storage.logs.opened import needed, reading, too_many
+from vgyro.storage.logs.opened import Damaged, needed, reading, too_many
 
 DEPTH = 16
 MOST = 10_000
@@ -39,12 +39,12 @@ def _walk(group: Any, prefix: str, path: Path, variables: list[Variable], notes:
     import h5py
 
     if depth > DEPTH:
-        raise ValueError(f"groups nested more than {DEPTH} deep")
+        raise Damaged(f"groups nested more than {DEPTH} deep")
     for key in group:
         if key.startswith("#") or not isinstance(group.get(key, getlink=True), h5py.HardLink):
             continue
         if len(variables) + len(notes) > MOST:
-            raise ValueError(f"more than {MOST} arrays")
+            raise Damaged(f"more than {MOST} arrays")
         item, name = group[key], f"{prefix}{key}"
         kind = _class(item)
         if "MATLAB_object_decode" in item.attrs or kind in (
@@ -74,9 +74,9 @@ def _dataset(item: Any, name: str, path: Path, kind: str) -> list[Variable]:
     if item.external or item.is_virtual:
         return []
     if too_many(item.shape, item.dtype.itemsize, stored, SPARSE_RATIO if item.chunks else 1):
-        raise ValueError(f"{name} claims {item.shape} values and stores {stored} bytes")
+        raise Damaged(f"{name} claims {item.shape} values and stores {stored} bytes")
     if item.chunks and math.prod(item.chunks) * item.dtype.itemsize > CHUNK_BYTES:
-        raise ValueError(f"{name} has chunks of more than {CHUNK_BYTES} bytes")
+        raise Damaged(f"{name} has chunks of more than {CHUNK_BYTES} bytes")
     place, shape = item.name, item.shape
     if len(shape) == 2 and 1 in shape:
         return [Variable(name, (max(shape),), item.dtype, _pieces(path, place, 0 if shape[1] == 1 else 1, True))]

@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vgyro.storage.logs.opened import Damaged
+
 MATRIX, COMPRESSED = 14, 15
 STRUCT = 2
 COMPLEX = 0x800
@@ -58,7 +60,7 @@ def arrays_of(path: Path) -> list[Array]:
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
         head = mapped[:HEADER]
         if len(head) < HEADER or head[126:128] not in (b"IM", b"MI"):
-            raise ValueError("the header of 128 bytes is not one of a MATLAB 5.0 file")
+            raise Damaged("the header of 128 bytes is not one of a MATLAB 5.0 file")
         order = "<" if head[126:128] == b"IM" else ">"
         place, size, found = HEADER, len(mapped), list[Array]()
         while place < size:
@@ -66,7 +68,7 @@ def arrays_of(path: Path) -> list[Array]:
                 raise EOFError(f"cut short at byte {place}")
             kind, length = struct.unpack_from(f"{order}II", mapped, place)
             if kind not in (COMPRESSED, MATRIX):
-                raise ValueError(f"no variable at byte {place}, but an element of type {kind}")
+                raise Damaged(f"no variable at byte {place}, but an element of type {kind}")
             if length > size - place - 8:
                 raise EOFError(f"the variable at byte {place} needs {length} bytes; {size - place - 8} are left")
             start, whole = _content(path, place + 8, length, kind == COMPRESSED, order)
@@ -98,9 +100,9 @@ def _content(
         raise EOFError("a compressed variable is cut short")
     kind, inner = struct.unpack_from(f"{order}II", start)
     if kind != MATRIX:
-        raise ValueError(f"a compressed element of type {kind}, not a variable")
+        raise Damaged(f"a compressed element of type {kind}, not a variable")
     if inner > length * RATIO:
-        raise ValueError(f"{inner} bytes claimed by {length} compressed ones")
+        raise Damaged(f"{inner} bytes claimed by {length} compressed ones")
 
     def unpacked() -> memoryview:
         unpacker = zlib.decompressobj()
@@ -119,7 +121,7 @@ def _array(start: memoryview, whole: Callable[[], memoryview], order: str, depth
         return Array(name, "empty", (0, 0), False)
     parts = list(islice(_elements(start, order), 3))
     if len(parts) < 3 or len(parts[0][1]) < 8:
-        raise ValueError("an array without flags, dimensions or name")
+        raise Damaged("an array without flags, dimensions or name")
     (flags,) = struct.unpack_from(f"{order}I", parts[0][1])
     kind = CLASSES.get(flags & 0xFF, "unknown")
     own = bytes(parts[2][1]).rstrip(b"\0").decode("utf-8", "replace")
@@ -129,7 +131,7 @@ def _array(start: memoryview, whole: Callable[[], memoryview], order: str, depth
     dimensions = parts[1][1]
     shape = struct.unpack(f"{order}{len(dimensions) // 4}i", dimensions[: len(dimensions) // 4 * 4])
     if len(shape) < 2 or min(shape) < 0:
-        raise ValueError(f"{name or 'an array'} has the dimensions {shape}")
+        raise Damaged(f"{name or 'an array'} has the dimensions {shape}")
     if flags & 0xFF == STRUCT and math.prod(shape) == 1:
         return Array(name, kind, shape, False, fields=_fields(whole(), order, depth))
     load = None if len(kind) > 2 else lambda: _values(whole(), order, np.dtype(kind), shape)
@@ -139,17 +141,17 @@ def _array(start: memoryview, whole: Callable[[], memoryview], order: str, depth
 def _fields(data: memoryview, order: str, depth: int) -> tuple[Array, ...]:
     """The parts of a single struct."""
     if depth > DEEPEST or len(data) > STRUCT_BYTES:
-        raise ValueError(f"structs more than {DEEPEST} deep or larger than {STRUCT_BYTES} bytes")
+        raise Damaged(f"structs more than {DEEPEST} deep or larger than {STRUCT_BYTES} bytes")
     parts = list(_elements(data, order))
     if len(parts) < 5 or len(parts[3][1]) != 4:
-        raise ValueError("a struct without names of its fields")
+        raise Damaged("a struct without names of its fields")
     (width,) = struct.unpack(f"{order}i", parts[3][1])
     text = bytes(parts[4][1])
     count = len(text) // width if width > 0 else 0
     names = [text[at * width : (at + 1) * width].partition(b"\0")[0].decode("utf-8", "replace") for at in range(count)]
     contents = [content for kind, content in parts[5:] if kind == MATRIX]
     if len(contents) != count:
-        raise ValueError(f"a struct of {count} fields with {len(contents)} arrays")
+        raise Damaged(f"a struct of {count} fields with {len(contents)} arrays")
     return tuple(
         _array(content, lambda held=content: held, order, depth + 1, name)  # type: ignore[misc]
         for name, content in zip(names, contents, strict=True)
@@ -160,15 +162,15 @@ def _values(data: memoryview, order: str, wanted: np.dtype, shape: tuple[int, ..
     """The numbers of an array; MATLAB stores whole ones in as few bytes as they need."""
     parts = list(islice(_elements(data, order), 4))
     if len(parts) < 4:
-        raise ValueError("an array without values")
+        raise Damaged("an array without values")
     kind, content = parts[3]
     if kind not in STORED:
-        raise ValueError(f"values of type {kind}")
+        raise Damaged(f"values of type {kind}")
     stored = np.dtype(STORED[kind]).newbyteorder(order)  # type: ignore[arg-type]
     if len(content) != math.prod(shape) * stored.itemsize:
-        raise ValueError(f"{len(content)} bytes for an array {shape} of {stored}")
+        raise Damaged(f"{len(content)} bytes for an array {shape} of {stored}")
     if not np.can_cast(stored, wanted, "safe"):
-        raise ValueError(f"values of type {stored} in an array of {wanted}")
+        raise Damaged(f"values of type {stored} in an array of {wanted}")
     return np.frombuffer(content, stored).astype(wanted, copy=False).reshape(shape, order="F")
 
 
@@ -180,11 +182,11 @@ def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
         if kind >> 16:  # a small element: length and type in one word, up to four bytes after it
             kind, length = kind & 0xFFFF, kind >> 16
             if length > 4:
-                raise ValueError(f"a small element of {length} bytes")
+                raise Damaged(f"a small element of {length} bytes")
             yield kind, data[place + 4 : place + 4 + length]
             place += 8
             continue
         if length > len(data) - place - 8:
-            raise ValueError(f"an element of {length} bytes where {len(data) - place - 8} are left")
+            raise Damaged(f"an element of {length} bytes where {len(data) - place - 8} are left")
         yield kind, data[place + 8 : place + 8 + length]
         place += 8 + length + (-length % 8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import math
 import struct
 import zlib
@@ -31,14 +32,23 @@ DAMAGE: tuple[type[Exception], ...] = (
 )  # fmt: skip
 """What libraries raise on damaged files, beside errors of their own: their documentation does not list it."""
 
+LOG = logging.getLogger(__name__)
+"""What a library said goes there; people get a sentence of ours."""
+
 T = TypeVar("T")
 Errors = tuple[type[Exception], ...]
 
 
+class Damaged(ValueError):
+    """What our own readers find wrong in a file, in words for people."""
+
+
 def reason(error: Exception) -> str:
-    """An error of a library as one short line."""
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text[:200]}" if text else type(error).__name__
+    """Why a file cannot be read, in a few words; what a library said of it goes to the log alone."""
+    if isinstance(error, Damaged):
+        return str(error)
+    LOG.info("%s: %s", type(error).__name__, error)
+    return "damaged, or cut short"
 
 
 @contextmanager
@@ -53,12 +63,12 @@ def reading(what: str, path: Path, errors: Errors = ()) -> Iterator[None]:
         raise
     except (*DAMAGE, *errors) as error:
         raise DataError(
-            f"is not a readable {what} ({reason(error)})", str(path), "copy it again from its source"
+            f"is not a readable {what}: {reason(error)}", str(path), "copy it again from its source"
         ) from None
 
 
 def until_damage(items: Iterator[T], errors: Errors, broken: list[str]) -> Iterator[T]:
-    """Items up to the first one that a library cannot read; what it says is put into `broken`."""
+    """Items up to the first one that a library cannot read; then a word on it is in `broken`."""
     while True:
         try:
             item = next(items)
@@ -114,7 +124,7 @@ class OpenedLog:
     """A log of any family (LogFile): what is in it, and a function that streams one table.
 
     path   : as people know it;  stream : (the log, table, names of columns) → rows; both are checked before
-    broken : what a library said where a table could not be read on
+    broken : why a table could not be read on
     errors : a library's own errors, beside DAMAGE
     """
 

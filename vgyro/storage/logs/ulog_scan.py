@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
+from vgyro.storage.logs.opened import Damaged
+
 MAGIC = b"ULog\x01\x12\x35"
 SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 HEADER = 16
@@ -62,14 +64,14 @@ def scan(path: Path) -> Contents:
     found = Contents()
     with open(path, "rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
-            raise ValueError("does not begin as a ULog does")
+            raise Damaged("does not begin as a ULog does")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             if len(data) < HEADER:
-                raise ValueError("ends within its header")
+                raise Damaged("ends within its header")
             _walk(data, found)
     for name in found.formats:
         if (size := size_of(name, found.formats)) > LARGEST:
-            raise ValueError(f"message type {name!r} claims {size} bytes; a message holds {LARGEST} at most")
+            raise Damaged(f"message type {name!r} claims {size} bytes; a message holds {LARGEST} at most")
     return found
 
 
@@ -144,7 +146,7 @@ def _note(kind: str, content: bytes, found: Contents) -> bool:
             return True
     elif kind == "B" and len(content) >= 40 and found.needed[-1][1] == HEADER:
         if content[8] & ~1 or any(content[9:16]):
-            raise ValueError("made by a newer logger: its flags are unknown")
+            raise Damaged("made by a newer logger: its flags are unknown")
         found.odd = any(content[16:40])
         return not found.odd
     return False
