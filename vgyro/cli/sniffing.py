@@ -9,9 +9,10 @@ import numpy as np
 import pyarrow as pa
 
 from vgyro.board import Board
-from vgyro.cli.looking import HEAD_ROWS, head_of, open_plainly
+from vgyro.cli.looking import HEAD_ROWS, head_of
 from vgyro.cli.manifest_text import LogDraft
 from vgyro.errors import DataError
+from vgyro.log import Log
 from vgyro.storage.frames import gyro_rails
 from vgyro.storage.inputs import files_inside, read_board
 from vgyro.storage.layout import kept_channels
@@ -133,7 +134,7 @@ def _fractions(values: np.ndarray) -> bool:
 
 def opened_log(path: Path) -> LogFile:
     """A log, or the first one of a folder."""
-    return open_plainly(files_inside(path)[0] if path.is_dir() else path)
+    return open_log(files_inside(path)[0] if path.is_dir() else path, Log())
 
 
 def log_draft(path: Path, board: Board) -> LogDraft:
