@@ -16,7 +16,7 @@ from vgyro.log import Log
 from vgyro.storage.frames import gyro_rails
 from vgyro.storage.inputs import files_inside, read_board
 from vgyro.storage.layout import kept_channels
-from vgyro.storage.logs.families import HEAD, family_of
+from vgyro.storage.logs.families import HEAD, family_of, open_log
 from vgyro.storage.logs.refused import NOT_A_LOG
 from vgyro.storage.logs.refused import named as refused
 from vgyro.storage.logs.roles import roles_of
