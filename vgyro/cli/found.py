@@ -8,14 +8,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from vgyro.board import Board
 from vgyro.calibration import find_rest
+from vgyro.cli.found_words import array_lines, clock_lines, moving_words
 from vgyro.cli.looking import Choices, Look, are_one_array, array_of, log_of, look_at
-from vgyro.cli.manifest_text import ArrayDraft, LogDraft, RecordingDraft, manifest_text
+from vgyro.cli.manifest_text import ArrayDraft, RecordingDraft, manifest_text
 from vgyro.cli.sniffing import best_board, board_of_columns, is_dump, log_draft, measured_rate
 from vgyro.config import IntegrityOptions, RestOptions
 from vgyro.dataset import array_board, parse_manifest
@@ -24,7 +24,7 @@ from vgyro.storage.decode import open_recording
 from vgyro.storage.frames import gather
 from vgyro.storage.inputs import read_board
 from vgyro.storage.integrity import Integrity
-from vgyro.storage.logs.names import bare_name, is_called_time
+from vgyro.storage.logs.names import is_called_time
 from vgyro.storage.logs.roles import Roles
 
 LARGEST_LOOKED_AT = 400 << 20
@@ -154,7 +154,7 @@ def _logs(options: argparse.Namespace, folder: Path, names: Sequence[str]) -> Fo
             still = _times_that_stand(looks[0].sources[0].roles)
             what = f"has no column of time stamps{still}, so its rate is not known"
             raise UsageError(what, str(options.files[0]), "give it: --rate HZ")
-    found = Found(array, _board_of(array, drafts), drafts, [], list(_array_lines(looks, array, together)))
+    found = Found(array, _board_of(array, drafts), drafts, [], list(array_lines(looks, array, together)))
     for draft in drafts:
         found.lines += _surveyed(found, draft, folder, options.kind)
     return found
@@ -197,73 +197,6 @@ def _board_of(array: ArrayDraft, drafts: Sequence[RecordingDraft]) -> Board:
     return board
 
 
-def _array_lines(looks: Sequence[Look], array: ArrayDraft, together: bool) -> list[str]:
-    first = looks[0].sources[0]
-    lines = []
-    for look in looks:
-        form = f" ({', '.join(look.sources[0].table.text)})" if look.sources[0].table.text else ""
-        lines.append(f"{look.path.name}: {look.opened.family}{form}")
-    if together:
-        lines.append("  array      the files hold one gyro each and are about as long: one array (else: --separate)")
-    lines.append(f"  time       {first.roles.time or 'none: by the rate that you gave'}")
-    lines += _gyro_lines(array)
-    if array.temperatures:
-        lines.append(f"  thermo     {', '.join(one['name'] for one in array.temperatures)}: °C")
-    if array.other:
-        lines.append("  not used   " + "; ".join(f"{column} ({what})" for column, what in array.other.items()))
-    if looks[0].unused:
-        lines.append("  not used   tables with gyros: " + ", ".join(looks[0].unused))
-    return lines
-
-
-def _gyro_lines(array: ArrayDraft) -> list[str]:
-    """A line for all gyros whose unit is known in the same way."""
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for gyro in array.gyros:
-        unit = gyro.get("unit") or f"counts of {gyro['scale']:g} deg/s"
-        groups.setdefault((unit, array.why[gyro["name"]].split(":")[0]), []).append(gyro)
-    lines = []
-    for (unit, _), gyros in groups.items():
-        told = ", ".join(f"{gyro['name']} (axis {gyro['axis']}{_where(array, gyro)})" for gyro in gyros)
-        lines.append(f"  gyro{'s' if len(gyros) > 1 else ' '}      {told}")
-        lines.append(f"  unit       {unit}: {array.why[gyros[0]['name']]}")
-    return lines
-
-
-def _where(array: ArrayDraft, gyro: dict[str, Any]) -> str:
-    """Where a gyro stands, if not in a column of its name."""
-    place = array.places.get(gyro["name"], {"column": gyro.get("column")})
-    parts = [f"{key} {place[key]}" for key in ("file", "table") if key in place]
-    parts += [f"{column} {value}" for column, value in place.get("where", {}).items()]
-    if gyro["name"] not in (place["column"], bare_name(place["column"])):
-        parts.insert(0, f"column {place['column']}")
-    return "".join(f", {part}" for part in parts)
-
-
-def _clock_lines(record: Integrity) -> list[str]:
-    """What the stamps of each stream are; what is the same of several is said once."""
-    said: dict[str, list[str]] = {}
-    for clock in record.clocks:
-        said.setdefault(f"{clock['meaning']}: {clock['why']}", []).append(clock["stream"])
-    lines = [
-        f"  clock      {text}" + (f" ({', '.join(streams)})" if len(said) > 1 else "") for text, streams in said.items()
-    ]
-    for clock in record.clocks:
-        known = clock["alignment"]
-        if known and known["by"] == "common motion":
-            lines.append(
-                f"  joined     {clock['stream']} begins {known['offset_s']:+.4f} s after {known['to']}"
-                f" ({known['offset_low_s']:.4f} to {known['offset_high_s']:.4f}), its clock is"
-                f" {known['drift_ppm']:+.1f} ppm fast ({known['drift_low_ppm']:.1f} to"
-                f" {known['drift_high_ppm']:.1f}): by the motion in common"
-            )
-        elif known:
-            lines.append(
-                f"  joined     {clock['stream']} begins {known['offset_s']:+.6g} s after {known['to']}: by the stamps"
-            )
-    return lines
-
-
 def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | None) -> list[str]:
     """Read the recording as the pipeline will, set its kind, and say what was seen."""
     size = sum(one.stat().st_size for name in draft.files for one in _all_files(folder / name))
@@ -282,7 +215,7 @@ def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | Non
     lines = [f"  {draft.name}:" if len(found.drafts) > 1 else ""]
     counts = f"{frames.lost} lost, {frames.bad} damaged, {frames.repeated} repeated"
     lines.append(f"  samples    {frames.good} at {record.rate_hz:.6g} Hz, {record.duration_s:.6g} s; {counts}")
-    lines += _clock_lines(record)
+    lines += clock_lines(record)
     for clock in record.clocks:
         if draft.log is not None and draft.log.time is not None:
             draft.log.meaning = f"found to be {clock['meaning']}"
@@ -290,14 +223,9 @@ def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | Non
     lines += [f"  {'suspect':<10} {text}" for text in record.reasons] + [
         f"  {'note':<10} {text}" for text in record.warnings
     ]
-    moving = f", moves from {_stretches(stretches)}" if 0 < share < 1 - MOVES else ""
+    moving = f", moves from {moving_words(stretches)}" if 0 < share < 1 - MOVES else ""
     lines.append(f"  kind       {draft.kind}: {100 * share:.0f} % at rest{moving}")
     return [line for line in lines if line]
-
-
-def _stretches(stretches: Sequence[tuple[float, float]]) -> str:
-    shown = ", ".join(f"{start:.3g} to {stop:.3g} s" for start, stop in stretches[:3])
-    return shown + (f" and {len(stretches) - 3} times more" if len(stretches) > 3 else "")
 
 
 def _all_files(path: Path) -> list[Path]:
@@ -325,6 +253,3 @@ def _rest_share(at_rest: np.ndarray, time: np.ndarray) -> tuple[float, list[tupl
     edges = np.flatnonzero(np.diff(np.concatenate([[False], ~at_rest, [False]]).astype(np.int8)))
     moving = [(float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     return float(at_rest.mean()), moving
-
-
-__all__ = ["Found", "LogDraft", "find", "survey"]
