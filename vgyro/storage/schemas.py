@@ -43,14 +43,14 @@ _ALL = (
     Schema("frames", 1, "decoded frames of one recording", (
         Column("counter", "", "frame counter without its wraps; row number where the board has none"),
         _TIME, _SEGMENT,
-        Column("{channel}", "count", "value of a channel as sent, or deg/s for a log that holds rates"),
+        Column("{channel}", "count", "value of a channel as sent, or deg/s for a log that holds rates; NaN: no value"),
     )),
     Schema("rates", 1, "calibrated rates of one recording", (
         _TIME, _SEGMENT,
         Column("at_rest", "", "true where the board is known to stand still"),
         Column("reference", "deg/s", "true rate, where it is known"),
-        Column("temp_{temperature}", "°C", "temperature channel"),
-        Column("{gyro}", "deg/s", "rate along the gyro's axis"),
+        Column("temp_{temperature}", "°C", "temperature channel; NaN: no value"),
+        Column("{gyro}", "deg/s", "rate along the gyro's axis; NaN: no value"),
     )),
     Schema("series", 1, "the series in which volatility is analysed: means of blocks of samples", (
         Column("time", "s", "time of the block's first sample"),
