@@ -40,12 +40,14 @@ _WINDOW = (
 )
 
 _ALL = (
-    Schema("frames", 1, "decoded frames of one recording", (
+    Schema("frames", 2, "decoded frames of one recording, or rows of its logs", (
         Column("counter", "", "frame counter without its wraps; row number where the board has none"),
         _TIME, _SEGMENT,
         Column("{channel}", "count", "value of a channel as sent, or deg/s for a log that holds rates; NaN: no value"),
     )),
-    Schema("rates", 1, "calibrated rates of one recording", (
+    Schema("rates", 2, "calibrated rates of one recording; in the metadata also rate_hz, clipped, calibration and "
+           "temperature by gyro, delays by axis, and where there are any missing and noise_gain by gyro, lost_rows by "
+           "axis, moved", (
         _TIME, _SEGMENT,
         Column("at_rest", "", "true where the board is known to stand still"),
         Column("reference", "deg/s", "true rate, where it is known"),
