@@ -7,7 +7,7 @@ import numpy as np
 
 from vgyro.storage.clocks import ClockOptions, ClockRecord, Placed, survey
 
-LOGS = Path("/work/shared/cases/logs")
+LOGS = Path(__file__).resolve().parents[2] / "cases" / "logs"
 
 
 class Run(NamedTuple):
