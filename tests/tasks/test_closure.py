@@ -57,3 +57,8 @@ def test_editing_units_changes_everything_that_converts(package: Path) -> None:
 def test_imports_inside_functions_count() -> None:
     # vgyro.engine loads the reference engine when it is asked for, not before.
     assert "vgyro.engine.reference.garch" in closure.import_closure("vgyro.tasks.volatility")
+
+
+@pytest.mark.parametrize("module", ["parquet", "ulog", "bag", "numpy_file", "matlab", "mat5", "text.fast", "joined"])
+def test_every_reader_of_logs_counts_for_decoding(module: str) -> None:
+    assert f"vgyro.storage.logs.{module}" in closure.import_closure("vgyro.tasks.decode")

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from vgyro.alignment import Delays, interpolate, noise_gain, relative_delays
 from vgyro.board import Board
 from vgyro.dataset import AT_REST, Recording
 from vgyro.storage.tables import read_column
+
+if TYPE_CHECKING:
+    from vgyro.alignment import Delays
 
 
 class HasRates(Protocol):
@@ -43,6 +45,9 @@ def lateness(converter: HasRates, frames: Path, rate_hz: float) -> Lateness:
     """
     if converter.recording.kind in AT_REST:
         return Lateness()
+    # scipy.signal takes a second to import: only recordings that move pay for it.
+    from vgyro.alignment import interpolate, noise_gain, relative_delays
+
     segment = read_column(frames, "segment")
     record: dict[str, Any] = {}
     rates: dict[str, np.ndarray] = {}

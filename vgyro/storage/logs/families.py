@@ -8,7 +8,6 @@ import tempfile
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 from vgyro.errors import DataError
@@ -42,13 +41,35 @@ class Family:
     library: str | None = None
 
 
-def _module(name: str) -> Callable[[Path, Log, str], LogFile]:
-    """The open_log of a family's module, imported when it is needed."""
+# A reader is imported when it is needed, and by its name as it stands, so that an edit of it re-runs what it read.
+def _open_parquet(path: Path, _: Log, __: str) -> LogFile:
+    from vgyro.storage.logs import parquet
 
-    def open_(path: Path, _: Log, __: str) -> LogFile:
-        return import_module(f"vgyro.storage.logs.{name}").open_log(path)
+    return parquet.open_log(path)
 
-    return open_
+
+def _open_ulog(path: Path, _: Log, __: str) -> LogFile:
+    from vgyro.storage.logs import ulog
+
+    return ulog.open_log(path)
+
+
+def _open_bag(path: Path, _: Log, __: str) -> LogFile:
+    from vgyro.storage.logs import bag
+
+    return bag.open_log(path)
+
+
+def _open_numpy(path: Path, _: Log, __: str) -> LogFile:
+    from vgyro.storage.logs import numpy_file
+
+    return numpy_file.open_log(path)
+
+
+def _open_matlab(path: Path, _: Log, __: str) -> LogFile:
+    from vgyro.storage.logs import matlab
+
+    return matlab.open_log(path)
 
 
 def _open_text(path: Path, log: Log, engine: str) -> LogFile:
@@ -81,13 +102,13 @@ def _is_matlab(head: bytes, _: Path) -> bool:
 
 
 FAMILIES: dict[str, Family] = {
-    "parquet": Family("Parquet", (".parquet",), lambda head, _: head.startswith(b"PAR1"), _module("parquet")),
+    "parquet": Family("Parquet", (".parquet",), lambda head, _: head.startswith(b"PAR1"), _open_parquet),
     "ulog": Family(
-        "PX4 ULog", (".ulg", ".ulog"), lambda head, _: head.startswith(b"ULog\x01\x12\x35"), _module("ulog"), "pyulog"
+        "PX4 ULog", (".ulg", ".ulog"), lambda head, _: head.startswith(b"ULog\x01\x12\x35"), _open_ulog, "pyulog"
     ),
-    "bag": Family("ROS 1 or ROS 2 bag, MCAP", (".bag", ".mcap", ".db3"), _is_bag, _module("bag"), "rosbags"),
-    "numpy": Family("NumPy array", (".npy", ".npz"), _is_numpy, _module("numpy_file")),
-    "matlab": Family("MATLAB or HDF5 file", (".mat", ".h5", ".hdf5"), _is_matlab, _module("matlab"), "h5py"),
+    "bag": Family("ROS 1 or ROS 2 bag, MCAP", (".bag", ".mcap", ".db3"), _is_bag, _open_bag, "rosbags"),
+    "numpy": Family("NumPy array", (".npy", ".npz"), _is_numpy, _open_numpy),
+    "matlab": Family("MATLAB or HDF5 file", (".mat", ".h5", ".hdf5"), _is_matlab, _open_matlab, "h5py"),
     "text": Family("text with columns", (".csv", ".tsv", ".txt", ".log", ".dat"), _is_text, _open_text),
 }
 """By name, in the order in which they are tried."""

@@ -14,7 +14,6 @@ from vgyro.storage.frames import Frames, channel_watches
 from vgyro.storage.integrity import FileRecord, Integrity, Ledger, Refused
 from vgyro.storage.logs.files import log_files, open_all, shown_names
 from vgyro.storage.logs.intake import Intake, Taken, take_in
-from vgyro.storage.logs.joined import Joined
 from vgyro.storage.logs.placing import Placing
 from vgyro.storage.logs.streams import streams_of
 from vgyro.storage.logs.table import LogFile
@@ -72,6 +71,8 @@ class LogReader:
             clocks = [Placing(taken.intakes[0], self.rate_hz, self.board)]
             frames, notes = clocks[0].frames(self._ledger), list[str]()
         else:
+            from vgyro.storage.logs.joined import Joined
+
             joined = Joined(taken.intakes, self.recording, self.rate_hz, self.board)
             frames, clocks, notes = joined.frames(self._ledger), joined.placings, joined.notes
         for chunk in frames:
