@@ -17,6 +17,7 @@ from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.motion_models import Motion
 from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.parity_dcc import prefer_dcc
+from vgyro.fusion.prepared import prepared
 from vgyro.fusion.slow import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.smoother import choose_motion
@@ -26,16 +27,17 @@ DCC = ("dcc", "in_sample", "residual")
 
 @dataclass(frozen=True)
 class Analysed:
-    """variances : R_t;  weights : of least variance for it;  slow : b;  note : what was chosen"""
+    """array : as prepared;  variances : R_t;  weights : of least variance for it;  slow : b;  note : what was chosen"""
 
+    array: ArrayRates
     variances: Variances
     weights: SampleWeights
     slow: SlowErrors
     note: str
 
-    def rate(self, array: ArrayRates) -> np.ndarray:
+    def rate(self) -> np.ndarray:
         """u(t)'(y - b) [T], deg/s."""
-        return combined_without(array, self.weights, self.slow)
+        return combined_without(self.array, self.weights, self.slow)
 
     def variance(self) -> np.ndarray:
         """Variance u'R_t·u of its white noise [T], (deg/s)² a sample."""
@@ -54,17 +56,19 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
         known = analysed(array, parameters)
         moving = ~array.at_rest if array.at_rest.any() else None
         return choose_motion(
-            known.rate(array), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
+            known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
             parameters.motion_models, parameters.engine, moving,
         )  # fmt: skip
 
     return array.once(("motion", parameters), choose)
 
 
-def _analysed(array: ArrayRates, parameters: FilterParameters) -> Analysed:
+def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
+    ready = prepared(raw, parameters)
+    array = ready.array
     variances = shared_variances(array, parameters, True)
     score = prefer_dcc(array, parameters, variances)
-    if score.prefer:
+    if score.prefer and parameters.has("dcc"):
         variances = _of_dcc(array, parameters, variances)
     blocks = SlowBlocks.of(array)
     lasting = variances.variance * (1.0 + variances.phi) / (1.0 - variances.phi)
@@ -72,9 +76,9 @@ def _analysed(array: ArrayRates, parameters: FilterParameters) -> Analysed:
     white[blocks.mean_of(variances.start, variances.excluded.astype(float)) > 0] = np.inf
     slow = slow_errors(array, parameters, white, variances.correlation, blocks)
     left_out = f"{len(array.faults)} faults left out" if array.faults else ""
-    notes = [variances.note, score.note, slow.note, left_out]
+    notes = [*ready.notes, variances.note, score.note, slow.note, left_out]
     weights = variances.sample_weights(parameters.engine)
-    return Analysed(variances, weights, slow, "; ".join(note for note in notes if note))
+    return Analysed(array, variances, weights, slow, "; ".join(note for note in notes if note))
 
 
 def _of_dcc(array: ArrayRates, parameters: FilterParameters, variances: Variances) -> Variances:

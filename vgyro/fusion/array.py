@@ -14,7 +14,9 @@ from vgyro.config import MOTION_MODELS, FusionOptions, MotionModel, Switch
 from vgyro.errors import DataError
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.events import FaultEvent
+from vgyro.fusion.parts import PARTS
 from vgyro.units import arw_deg_s_rt_hz
+from vgyro.validation import did_you_mean
 
 T = TypeVar("T")
 Family = Literal["baseline", "paper", "ours"]
@@ -152,6 +154,7 @@ class FilterParameters:
     in_motion       : the board moves in this recording, at least in part
     engine          : who runs the recursions
     definition      : definition of r_t, for the methods that have one each
+    without         : parts of `recommended` (vgyro.fusion.parts) that are left out
     """
 
     bandwidth_hz: float = 1.0
@@ -170,6 +173,18 @@ class FilterParameters:
     in_motion: bool = False
     engine: str = "native"
     definition: str = ""
+    without: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        unknown = self.without - set(PARTS)
+        if unknown:
+            raise DataError(f"recommended has no part {min(unknown)!r}{did_you_mean(min(unknown), list(PARTS))}")
+
+    def has(self, part: str) -> bool:
+        """Is this part of `recommended` in use?"""
+        if part not in PARTS:
+            raise KeyError(part)
+        return part not in self.without
 
     @classmethod
     def of(

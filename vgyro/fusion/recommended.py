@@ -29,11 +29,11 @@ from vgyro.fusion.weights import min_variance_weights
 def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """All of it, smoothed, with the posterior standard deviation of each sample."""
     known = analysed(array, parameters)
-    variances, note = in_band(array, known.variances, passed_hz(array, parameters, known))
+    variances, note = in_band(known.array, known.variances, passed_hz(array, parameters, known))
     weights = known.weights if not note else variances.sample_weights(parameters.engine)
     shares = variances.weights(parameters.engine)
     signal = Signal(
-        combined_without(array, weights, known.slow),
+        combined_without(known.array, weights, known.slow),
         known.variances.combined_variance(shares)[variances.block_of_sample()],
         known.variances.colour(shares),
         weights,
@@ -61,7 +61,7 @@ def passed_hz(array: ArrayRates, parameters: FilterParameters, known: Analysed) 
 def recommended_unsmoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """The same without a model of the motion: u(t)'(y - b), full bandwidth, no delay."""
     known = analysed(array, parameters)
-    return Fused.undelayed(known.rate(array), known.weights, known.note)
+    return Fused.undelayed(known.rate(), known.weights, known.note)
 
 
 def static_weights(array: ArrayRates, parameters: FilterParameters) -> np.ndarray:

@@ -194,7 +194,7 @@ def shared_activity(array: ArrayRates, parameters: FilterParameters) -> Activity
         known, motion = analysed(array, parameters), shared_motion(array, parameters)
         variance = known.variance()
         return find_activity(
-            known.rate(array), variance, array.segment, array.rate_hz, motion, known.variances.colour(),
+            known.rate(), variance, array.segment, array.rate_hz, motion, known.variances.colour(),
             *_standstill(array, parameters, variance),
         )  # fmt: skip
 

@@ -1,0 +1,25 @@
+"""The parts of `recommended`, by name: each can be left out, so that the benchmark shows what it brings."""
+
+from __future__ import annotations
+
+PARTS: dict[str, str] = {
+    "faults": "leave a gyro out while it is at fault",
+    "clipped": "samples at the end of a gyro's range count as missing",
+    "tails": "samples far off count for less (Student's t)",
+    "quantised": "no gyro is better than its step allows",
+    "response": "scale factors, delays and poles relative to the array, from the motion",
+    "pole": "the sensor's low-pass is undone where it is declared or the motion shows it",
+    "changing": "variances that change with time",
+    "segments": "change points of the variances",
+    "changing_correlation": "correlations that change with time",
+    "dcc": "variances of DCC where it forecasts better",
+    "slow": "slow errors of the gyros, from their differences",
+    "slow_walk": "random walks by likelihood instead of those of the noise record",
+    "temperature": "slow errors that follow the temperature",
+    "anchors": "standstill pins the common bias",
+    "band": "variances of the band that passes",
+    "risk": "the motion's parameters by the smoother's own error, after their likelihood",
+    "calibration": "the posterior variance is scaled by what the spectrum leaves over",
+    "activity": "motion that comes and goes",
+    "guard": "the average, where the recording itself shows it to be better",
+}
