@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights
+from vgyro.fusion.analysed import DCC, analysed
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.parity import parity_variances
 from vgyro.fusion.parity_dcc import prefer_dcc
@@ -96,6 +97,20 @@ def test_no_more_blocks_than_memory_allows(monkeypatch):
     h, z = unsteady(900, 3, 6)
     monkeypatch.setattr("vgyro.fusion.parity_dcc.MOST_BLOCKS", 400)
     assert 380 <= score(array_of(np.sqrt(h) * z, np.sqrt(h))).blocks <= 400
+
+
+def test_only_causal_deviations_were_made():
+    # Expected: where DCC wins, R_t is that of the causal deviations; of the in-sample ones where there are some.
+    h, z = unsteady(3000, 5, 1)
+    array = array_of(np.sqrt(h) * z, np.sqrt(h))
+    assert score(array).prefer
+    parameters = FilterParameters(in_motion=True)
+    found = analysed(array, parameters).variances
+    block = (found.start + found.stop) // 2 // LENGTH
+    np.testing.assert_allclose(found.variance, LENGTH * h[block], rtol=1e-6)
+    in_sample = {**array.deviations, DCC: SampleWeights.of(2.0 * np.sqrt(h), array.deviations[KEY].block)}
+    both = analysed(replace(array, deviations=in_sample), parameters).variances
+    np.testing.assert_allclose(both.variance, 4.0 * LENGTH * h[block], rtol=1e-6)
 
 
 def test_nothing_to_compare():

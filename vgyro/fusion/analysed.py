@@ -23,6 +23,7 @@ from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.smoother import choose_motion
 
 DCC = ("dcc", "in_sample", "residual")
+CAUSAL_DCC = ("dcc", "causal", "residual")
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,8 @@ def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
 
 
 def _of_dcc(array: ArrayRates, parameters: FilterParameters, variances: Variances) -> Variances:
-    """The same with the variances that in-sample GARCH gives, where it gives any."""
-    deviations = array.deviations[DCC]
+    """The same with the variances that GARCH gives, where it gives any: in-sample, or else causal ones."""
+    deviations = array.deviations[DCC if DCC in array.deviations else CAUSAL_DCC]
     length = max(1, round(array.rate_hz / parameters.block_hz))
     table = np.concatenate(list(deviations.rows([slice(0, int(deviations.block.max()) + 1)])))
     block = deviations.block[(variances.start + variances.stop) // 2]
