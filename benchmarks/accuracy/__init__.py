@@ -1,0 +1,1 @@
+"""Accuracy of every fusion method on simulated recordings whose truth is known: `python -m benchmarks.accuracy`."""

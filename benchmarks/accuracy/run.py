@@ -1,0 +1,170 @@
+"""Run methods on a simulated trial as the pipeline would: noise from rest, faults, parameters, rates, scores.
+
+What is not as in the pipeline: nothing is written, the values are not rounded to single precision, the rest recording is
+believed to be at rest, and no GARCH/DCC weights are fitted (rows that need them say that they cannot run).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.accuracy.ledger import TimedRates, timed
+from benchmarks.accuracy.scenario import Scenario
+from benchmarks.accuracy.scores import Errors, errors_of, fault_score, honesty_of
+from benchmarks.accuracy.simulate import simulate
+from benchmarks.accuracy.trial import Recording, Trial
+from vgyro.calibration import find_rest
+from vgyro.config import FaultOptions, FusionOptions, MetricsOptions, RestOptions
+from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters
+from vgyro.fusion.faults import search_faults
+from vgyro.fusion.missing import fill_missing
+from vgyro.fusion.registry import run_methods, select
+from vgyro.metrics import Sampling
+from vgyro.tasks.fusion_inputs import in_motion
+from vgyro.tasks.noise import ArrayNoiseRecord, noise_at_rest, noise_in_motion, record_of
+from vgyro.tasks.rates_file import ArrayFile, FileColumns
+
+Row = dict[str, Any]
+NO_WEIGHTS = "no weights of DCC or CCC are fitted here"
+NOWHERE = Path("simulated")
+
+
+@dataclass(frozen=True)
+class PartArrays:
+    """One recording as methods take it.  search_note : what faults were not looked for"""
+
+    recording: Recording
+    array: ArrayRates
+    parameters: FilterParameters
+    search_note: str
+
+
+def trial_arrays(trial: Trial, without: frozenset[str] = frozenset()) -> dict[str, PartArrays]:
+    """Part ("motion", "rest") → what the pipeline would hand to the methods.
+
+    without : parts of `recommended` that are left out; without "faults" nothing is looked for
+    """
+    recordings = {"motion": trial.motion, **({"rest": trial.rest} if trial.rest is not None else {})}
+    wanted = {part: one for part, one in recordings.items() if part in trial.scenario.score}
+    noise = _noise(trial)
+    return {part: _arrays(one, noise, without) for part, one in wanted.items()}
+
+
+def _arrays(recording: Recording, noise: ArrayNoise, without: frozenset[str]) -> PartArrays:
+    rate = recording.rate.copy(order="F")
+    missing = fill_missing(rate, recording.rate_hz)
+    at_rest = np.full(len(rate), recording.kind == "static")
+    if recording.kind == "free":
+        at_rest = find_rest(rate, recording.rate_hz, RestOptions(), recording.segment)
+    array = TimedRates(
+        rate, recording.rate_hz, recording.segment, at_rest, noise, temperature=recording.temperature,
+        stretch_time=recording.stretch_time, missing=missing,
+    )  # fmt: skip
+    parameters = FilterParameters.of(FusionOptions(), in_motion(recording.kind, at_rest, moved=False))
+    note = "left out"
+    if "faults" not in without:
+        zero = np.zeros((rate.shape[1], 2))
+        unknown = replace(array, noise=_unknown(rate.shape[1]))
+        search = search_faults(unknown, FaultOptions(), zero, in_hand=recording.kind == "free")
+        array, note = replace(array, faults=tuple(search.events)), search.note
+    return PartArrays(recording, array, replace(parameters, without=without), note)
+
+
+def _unknown(gyros: int) -> ArrayNoise:
+    return ArrayNoise(np.full(gyros, math.nan), np.full(gyros, math.nan), np.eye(gyros))
+
+
+def _noise(trial: Trial) -> ArrayNoise:
+    """The noise record as vgyro.tasks.noise makes it: from the rest recording, else from differences in motion."""
+    recording = trial.motion if trial.rest is None else trial.rest
+    rate = recording.rate.copy(order="F")
+    fill_missing(rate, recording.rate_hz)
+    names = [f"g{gyro + 1}" for gyro in range(rate.shape[1])]
+    columns = dict(zip(names, rate.T, strict=True))
+    if trial.rest is None:
+        frame = ArrayFile(rate, recording.segment, recording.at_rest, recording.rate_hz, NOWHERE, "z")
+        found = noise_in_motion(list(rate.T), frame, "native")
+    else:
+        places = [(NOWHERE, name) for name in names]
+        sampling = Sampling.of(recording.rate_hz, recording.segment)
+        held = {(NOWHERE, name): column for name, column in columns.items()}
+        found = noise_at_rest(FileColumns(places, held=held), sampling, MetricsOptions(), "native")
+    return _as_read(found, names)
+
+
+def _as_read(found: ArrayNoiseRecord, names: list[str]) -> ArrayNoise:
+    """As vgyro.tasks.fusion_inputs.read_noise reads the record."""
+    record = record_of(found, names, "z", "rest")
+    arw, rrw = (np.array([record[name][gyro] for gyro in names], dtype=float) for name in ("arw", "rrw"))
+    limits = [gyro for gyro in names if str(record["rrw_source"][gyro]).startswith("upper limit")]
+    note = f"no random walk was found for {', '.join(limits)}: its upper limit stands in" if limits else ""
+    return ArrayNoise(arw, rrw, np.array(record["correlation"]), note)
+
+
+def score(
+    scenario: Scenario | str, seed: int, methods: Sequence[str] = (), without: frozenset[str] = frozenset()
+) -> list[Row]:
+    """One row a part and method of one trial.
+
+    methods : names of METHODS, () : all;  without : parts of `recommended` that are left out
+    """
+    trial = simulate(scenario, seed)
+    chosen = methods or list(METHODS)
+    rows = []
+    for part, known in trial_arrays(trial, without).items():
+        about = {"scenario": trial.scenario.name, "seed": seed, "part": part, "oracle_kind": trial.scenario.oracle}
+        yardsticks = _yardsticks(known) | _faults(trial, known)
+        rows += [about | row | yardsticks for row in _outcomes(known, chosen)]
+    return rows
+
+
+def _outcomes(known: PartArrays, methods: Sequence[str]) -> Iterator[Row]:
+    """Run the methods; a row each, of what came out or why nothing did."""
+    recording = known.recording
+    for method in select(list(methods)):
+        row: Row = {"method": method.name, "family": method.family, "causal": method.causal, "note": ""}
+        row |= dict.fromkeys(("sd", "rms", "sd_1s", "rms_1s", "nees", "coverage", "cpu_s"), math.nan)
+        if "weights" in method.needs and not known.array.weights:
+            yield row | {"note": NO_WEIGHTS, "state": "left out"}
+            continue
+        try:
+            [outcome], seconds = timed(lambda one=method: list(run_methods(known.array, known.parameters, [one], [""])))
+        except Exception as reason:  # A method that fails is a finding of the benchmark.
+            yield row | {"note": f"{type(reason).__name__}: {reason}", "state": "failed"}
+            continue
+        if outcome.fused is None:
+            yield row | {"note": outcome.note, "state": "cannot run"}
+            continue
+        rate, time = outcome.fused.rate, recording.time
+        row |= asdict(errors_of(rate, recording.truth, time, recording.rate_hz))
+        row |= asdict(honesty_of(rate, outcome.fused.sd, recording.truth, time))
+        yield row | {"cpu_s": seconds, "note": outcome.note, "state": "ran"}
+
+
+def _yardsticks(known: PartArrays) -> Row:
+    """Errors of the plain average, of the best gyro by itself, and of the oracle."""
+    recording, rate = known.recording, known.array.rate
+
+    def errors(one: np.ndarray) -> Errors:
+        return errors_of(one, recording.truth, recording.time, recording.rate_hz)
+
+    singles = [asdict(errors(column)) for column in rate.T]
+    best = {name: min(one[name] for one in singles) for name in singles[0]}
+    found = {"average": asdict(errors(rate.mean(axis=1))), "best_gyro": best}
+    return {f"{who}_{name}": value for who, values in found.items() for name, value in values.items()}
+
+
+def _faults(trial: Trial, known: PartArrays) -> Row:
+    """Faults found, missed, invented."""
+    recording = known.recording
+    found = fault_score(known.array.faults, recording.faults, recording.rate_hz, trial.scenario.excused)
+    named = "; ".join(f"g{one.gyro + 1} {one.kind} {one.start}-{one.stop}" for one in known.array.faults[:10])
+    return {f"faults_{name}": value for name, value in asdict(found).items()} | {
+        "faults_right": found.right, "faults_named_as": named, "faults_note": known.search_note,
+    }  # fmt: skip
