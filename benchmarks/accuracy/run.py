@@ -1,7 +1,7 @@
 """Run methods on a simulated trial as the pipeline would: noise from rest, faults, parameters, rates, scores.
 
-What is not as in the pipeline: nothing is written, the values are not rounded to single precision, the rest recording is
-believed to be at rest, and no GARCH/DCC weights are fitted (rows that need them say that they cannot run).
+What is not as in the pipeline: nothing is written, the values are not rounded to single precision, the rest recording
+is believed to be at rest, and no GARCH/DCC weights are fitted (rows that need them say that they cannot run).
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from benchmarks.accuracy.simulate import simulate
 from benchmarks.accuracy.trial import Recording, Trial
 from vgyro.calibration import find_rest
 from vgyro.config import FaultOptions, FusionOptions, MetricsOptions, RestOptions
-from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters
+from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters, Method, Outcome
 from vgyro.fusion.faults import search_faults
 from vgyro.fusion.missing import fill_missing
 from vgyro.fusion.registry import run_methods, select
@@ -134,7 +135,7 @@ def _outcomes(known: PartArrays, methods: Sequence[str]) -> Iterator[Row]:
             yield row | {"note": NO_WEIGHTS, "state": "left out"}
             continue
         try:
-            [outcome], seconds = timed(lambda one=method: list(run_methods(known.array, known.parameters, [one], [""])))
+            outcome, seconds = timed(partial(_outcome, known, method))
         except Exception as reason:  # A method that fails is a finding of the benchmark.
             yield row | {"note": f"{type(reason).__name__}: {reason}", "state": "failed"}
             continue
@@ -145,6 +146,10 @@ def _outcomes(known: PartArrays, methods: Sequence[str]) -> Iterator[Row]:
         row |= asdict(errors_of(rate, recording.truth, time, recording.rate_hz))
         row |= asdict(honesty_of(rate, outcome.fused.sd, recording.truth, time))
         yield row | {"cpu_s": seconds, "note": outcome.note, "state": "ran"}
+
+
+def _outcome(known: PartArrays, method: Method) -> Outcome:
+    return next(run_methods(known.array, known.parameters, [method], [""]))
 
 
 def _yardsticks(known: PartArrays) -> Row:

@@ -95,8 +95,8 @@ class Fault(StrictModel):
     """A fault of one gyro.
 
     gyro : from 0;  sort : noise (grows by `factor` over the stretch), stuck (repeats its last value), burst (`count`
-    stretches of `seconds`, noise × factor), zero, constant (the value `size`, deg/s), adc_noise (noise of `size` deg/s a
-    sample and no rate), absurd (one sample of `size`), copy (the same channel as gyro `of`)
+    stretches of `seconds`, noise × factor), zero, constant (the value `size`, deg/s), adc_noise (noise of `size` deg/s
+    a sample and no rate), absurd (one sample of `size`), copy (the same channel as gyro `of`)
     start_s, stop_s : stretch; None: from the beginning, to the end;  rest : also in the rest recording
     """
 
@@ -134,7 +134,7 @@ class Volatility(StrictModel):
 class Fading(StrictModel):
     """Biases that wander faster at first: the walk's K is factor × as large, fading with the time constant, s."""
 
-    factor: float = 20.0
+    factor: float = 10.0
     time_s: float = 100.0
 
 

@@ -14,6 +14,7 @@ from benchmarks.accuracy import effects
 from benchmarks.accuracy.scenario import Fault, Scenario, load
 from benchmarks.accuracy.signals import (
     LEAD_S,
+    balanced,
     changing,
     correlation_of,
     decay_of,
@@ -43,11 +44,12 @@ def _recording(scenario: Scenario, seed: int, part: str) -> Recording:
     """The rest recording or the motion."""
     samples = round((scenario.rest_s if part == "rest" else scenario.motion_s) * scenario.rate_hz)
     faults = tuple(one for one in scenario.faults if part == "motion" or one.rest)
-    truth, through, moving, line = _motion(scenario, seed, part, samples)
+    moments = _moments(scenario, seed, part, samples)
+    truth, through, moving, line = _motion(scenario, seed, part, moments)
     noise, known = _noise(scenario, seed, part, samples)
     factor, events = effects.noise_factor(faults, scenario, seed, samples)
     walk = _walk_steps(scenario, samples)
-    start = scenario.bias_sd * stream(seed, f"bias {part}").standard_normal(scenario.gyros)
+    start = scenario.bias_sd * balanced(seed, f"bias {part}", scenario.gyros)
     bias = start + walks(stream(seed, f"walk {part}"), samples, walk)
     offset = effects.slow_offset(scenario, seed, part, samples)
     scale = effects.coefficients(scenario, seed)["scale"]
@@ -61,21 +63,30 @@ def _recording(scenario: Scenario, seed: int, part: str) -> Recording:
         known, deviation=known.deviation * factor, walk=walk, usable=usable, scale=scale, offset=offset, moving=moving,
         line=line, values=values,
     )  # fmt: skip
-    whole = _as_logged(scenario, part, rate, truth, events, known)
+    whole = _as_logged(scenario, part, moments, rate, truth, events, known)
     return _with_gaps(whole, scenario, seed) if scenario.gaps and part == "motion" else whole
 
 
+def _moments(scenario: Scenario, seed: int, part: str, samples: int) -> np.ndarray:
+    """True times of the samples [T], in periods."""
+    moments = np.arange(samples, dtype=float)
+    if scenario.jitter and part == "motion":
+        moments[1:-1] += scenario.jitter * stream(seed, "jitter").uniform(-1.0, 1.0, samples - 2)
+    return moments
+
+
 def _motion(
-    scenario: Scenario, seed: int, part: str, samples: int
+    scenario: Scenario, seed: int, part: str, moments: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """True rate [T], what reaches each gyro [T, N], the motion's factor [T] and the line [T], deg/s."""
+    """True rate [T], what reaches each gyro [T, N], the motion's factor [T] and the line [T], deg/s.
+
+    moments [T] : of the samples, in periods
+    """
     how, many, rate_hz = scenario.motion, scenario.oversample, scenario.rate_hz
     lead = round(LEAD_S * rate_hz) * many
-    fine_hz, made = rate_hz * many, samples * many + lead
+    fine_hz, made = rate_hz * many, len(moments) * many + lead
     moment = (np.arange(made) - lead) / fine_hz
-    kept = np.arange(samples) * float(many) + lead
-    if scenario.jitter and part == "motion":
-        kept += many * scenario.jitter * stream(seed, "jitter").uniform(-1.0, 1.0, samples)
+    kept = moments * many + lead
     rest = part == "rest"
     factor = np.zeros(made) if rest else _taper(moment, how.start_s, how.stop_s)
     wander = poles_in_a_row(stream(seed, f"motion {rate_hz:g}"), made, decay_of(how.pole_hz, fine_hz), how.poles)
@@ -162,16 +173,17 @@ def _walk_steps(scenario: Scenario, samples: int) -> np.ndarray:
 
 
 def _as_logged(
-    scenario: Scenario, part: str, rate: np.ndarray, truth: np.ndarray, faults: list[TrueFault], known: Known
-) -> Recording:
-    """The recording without gaps."""
+    scenario: Scenario, part: str, moments: np.ndarray, rate: np.ndarray, truth: np.ndarray,
+    faults: list[TrueFault], known: Known,
+) -> Recording:  # fmt: skip
+    """The recording without gaps.  moments [T] : of the samples, in periods"""
     samples = len(rate)
     degrees = effects.celsius(scenario, samples)
     logged = degrees if scenario.temperature and scenario.temperature.logged else None
     kind = "static" if part == "rest" else scenario.kind
     faults = sorted(faults, key=lambda one: (one.start, one.gyros))
     return Recording(
-        kind, rate, scenario.rate_hz, np.arange(samples) / scenario.rate_hz, np.zeros(samples, dtype=np.int32),
+        kind, rate, scenario.rate_hz, moments / scenario.rate_hz, np.zeros(samples, dtype=np.int32),
         known.moving == 0.0, truth, logged, tuple(faults), known,
     )  # fmt: skip
 
