@@ -15,9 +15,10 @@ Key = tuple[int, Hashable]
 
 @dataclass(eq=False)
 class Entry:
-    """One shared result. own : CPU seconds without what it needed;  needs : that"""
+    """One shared result. own : CPU seconds without what it needed;  needs : that;  of : the array that it is of"""
 
     own: float = 0.0
+    of: object = None
     needs: set[Key] = field(default_factory=set)
 
 
@@ -29,22 +30,26 @@ class Ledger:
     entries: dict[Key, Entry] = field(default_factory=dict)
     since: float = 0.0
 
-    def _pass(self) -> None:
+    def book(self) -> None:
         """Book the time since the last event to what is being made."""
         now = time.process_time()
         if self.open:
             self.open[-1].own += now - self.since
         self.since = now
 
-    def made(self, key: Key, make: Callable[[], T]) -> T:
-        """Run `make` and book its time."""
-        self._pass()
-        entry = self.entries[key] = Entry()
+    def clear(self) -> None:
+        """Begin anew."""
+        self.entries.clear()
+
+    def made(self, key: Key, make: Callable[[], T], of: object) -> T:
+        """Run `make` and book its time. The array is held, so that its identity is no other's."""
+        self.book()
+        entry = self.entries[key] = Entry(of=of)
         self.open.append(entry)
         try:
             return make()
         finally:
-            self._pass()
+            self.book()
             self.open.pop()
 
     def need(self, key: Key) -> None:
@@ -75,12 +80,12 @@ class TimedRates(ArrayRates):
         """As ArrayRates.once."""
         place = (id(self), key)
         LEDGER.need(place)
-        return super().once(key, lambda: LEDGER.made(place, make))
+        return super().once(key, lambda: LEDGER.made(place, make, self))
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
     """What `run` returns, and its CPU seconds as if it had found out all that it needs by itself."""
-    LEDGER._pass()
+    LEDGER.book()
     entry = Entry()
     LEDGER.open.append(entry)
     try:
@@ -92,6 +97,6 @@ def timed(run: Callable[[], T]) -> tuple[T, float]:
 
 def _closed(entry: Entry) -> float:
     if entry in LEDGER.open:
-        LEDGER._pass()
+        LEDGER.book()
         LEDGER.open.remove(entry)
     return LEDGER.cost(entry)

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.accuracy.ledger import TimedRates, timed
+from benchmarks.accuracy.ledger import LEDGER, TimedRates, timed
+from benchmarks.accuracy.oracle import oracle
 from benchmarks.accuracy.scenario import Scenario
-from benchmarks.accuracy.scores import Errors, errors_of, fault_score, honesty_of
+from benchmarks.accuracy.scores import errors_of, fault_score, honesty_of
 from benchmarks.accuracy.simulate import simulate
 from benchmarks.accuracy.trial import Recording, Trial
 from vgyro.calibration import find_rest
@@ -34,6 +35,8 @@ from vgyro.tasks.rates_file import ArrayFile, FileColumns
 Row = dict[str, Any]
 NO_WEIGHTS = "no weights of DCC or CCC are fitted here"
 NOWHERE = Path("simulated")
+FIGURES = ("sd", "rms", "sd_1s", "rms_1s", "nees", "coverage", "cpu_s")
+NO_RATE = ("zero", "constant", "adc_noise")
 
 
 @dataclass(frozen=True)
@@ -116,53 +119,77 @@ def score(
     methods : names of METHODS, () : all;  without : parts of `recommended` that are left out
     """
     trial = simulate(scenario, seed)
-    chosen = methods or list(METHODS)
+    LEDGER.clear()
+    chosen = select(list(methods or METHODS))
+    try:
+        arrays = trial_arrays(trial, without)
+    except Exception as reason:  # Noise or faults fail: so would every method.
+        note = f"before any method: {type(reason).__name__}: {reason}"
+        arrays, failed = {}, [_row(method, "failed", note) for method in chosen]
+        parts = {part: getattr(trial, part) for part in trial.scenario.score}
+        return [_about(trial, part) | _yardsticks(trial, one) | row for part, one in parts.items() for row in failed]
     rows = []
-    for part, known in trial_arrays(trial, without).items():
-        about = {"scenario": trial.scenario.name, "seed": seed, "part": part, "oracle_kind": trial.scenario.oracle}
-        yardsticks = _yardsticks(known) | _faults(trial, known)
-        rows += [about | row | yardsticks for row in _outcomes(known, chosen)]
+    for part, known in arrays.items():
+        common = _about(trial, part) | _yardsticks(trial, known.recording, known.array.rate) | _faults(trial, known)
+        rows += [common | row for row in _outcomes(known, chosen)]
     return rows
 
 
-def _outcomes(known: PartArrays, methods: Sequence[str]) -> Iterator[Row]:
+def _about(trial: Trial, part: str) -> Row:
+    """Which trial it is. spoilt_average : at rest a gyro without a rate brings the average nearer to the truth, zero"""
+    broken = any(one.sort in NO_RATE for one in trial.scenario.faults)
+    return {
+        "scenario": trial.scenario.name, "seed": trial.seed, "part": part, "oracle_kind": trial.scenario.oracle,
+        "spoilt_average": part == "rest" and broken,
+    }  # fmt: skip
+
+
+def _row(method: Method, state: str, note: str) -> Row:
+    """Without figures."""
+    about = {"method": method.name, "title": method.title, "family": method.family, "causal": method.causal}
+    return about | dict.fromkeys(FIGURES, math.nan) | {"state": state, "note": note}
+
+
+def _outcomes(known: PartArrays, methods: Sequence[Method]) -> Iterator[Row]:
     """Run the methods; a row each, of what came out or why nothing did."""
     recording = known.recording
-    for method in select(list(methods)):
-        row: Row = {"method": method.name, "family": method.family, "causal": method.causal, "note": ""}
-        row |= dict.fromkeys(("sd", "rms", "sd_1s", "rms_1s", "nees", "coverage", "cpu_s"), math.nan)
+    for method in methods:
         if "weights" in method.needs and not known.array.weights:
-            yield row | {"note": NO_WEIGHTS, "state": "left out"}
+            yield _row(method, "left out", NO_WEIGHTS)
             continue
         try:
             outcome, seconds = timed(partial(_outcome, known, method))
         except Exception as reason:  # A method that fails is a finding of the benchmark.
-            yield row | {"note": f"{type(reason).__name__}: {reason}", "state": "failed"}
+            yield _row(method, "failed", f"{type(reason).__name__}: {reason}")
             continue
         if outcome.fused is None:
-            yield row | {"note": outcome.note, "state": "cannot run"}
+            yield _row(method, "cannot run", outcome.note)
             continue
         rate, time = outcome.fused.rate, recording.time
-        row |= asdict(errors_of(rate, recording.truth, time, recording.rate_hz))
-        row |= asdict(honesty_of(rate, outcome.fused.sd, recording.truth, time))
-        yield row | {"cpu_s": seconds, "note": outcome.note, "state": "ran"}
+        figures = asdict(errors_of(rate, recording.truth, time, recording.rate_hz))
+        figures |= asdict(honesty_of(rate, outcome.fused.sd, recording.truth, time))
+        yield _row(method, "ran", outcome.note) | figures | {"cpu_s": seconds}
 
 
 def _outcome(known: PartArrays, method: Method) -> Outcome:
     return next(run_methods(known.array, known.parameters, [method], [""]))
 
 
-def _yardsticks(known: PartArrays) -> Row:
-    """Errors of the plain average, of the best gyro by itself, and of the oracle."""
-    recording, rate = known.recording, known.array.rate
+def _yardsticks(trial: Trial, recording: Recording, rate: np.ndarray | None = None) -> Row:
+    """Errors of the plain average, of the best gyro by itself, and of the oracle.  rate [T, N] : filled in"""
+    if rate is None:
+        rate = recording.rate.copy(order="F")
+        fill_missing(rate, recording.rate_hz)
 
-    def errors(one: np.ndarray) -> Errors:
-        return errors_of(one, recording.truth, recording.time, recording.rate_hz)
+    def errors(one: np.ndarray) -> dict[str, float]:
+        return asdict(errors_of(one, recording.truth, recording.time, recording.rate_hz))
 
-    singles = [asdict(errors(column)) for column in rate.T]
+    singles = [errors(column) for column in rate.T]
     best = {name: min(one[name] for one in singles) for name in singles[0]}
-    found = {"average": asdict(errors(rate.mean(axis=1))), "best_gyro": best}
-    return {f"{who}_{name}": value for who, values in found.items() for name, value in values.items()}
+    known = oracle(recording, trial.scenario)
+    found = {"average": errors(rate.mean(axis=1)), "best_gyro": best, "oracle": errors(known.rate)}
+    row = {f"{who}_{name}": value for who, values in found.items() for name, value in values.items()}
+    return row | {"oracle_nees": honesty_of(known.rate, known.sd, recording.truth, recording.time).nees}
 
 
 def _faults(trial: Trial, known: PartArrays) -> Row:

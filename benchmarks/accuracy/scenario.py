@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any, Literal
 
@@ -208,7 +209,7 @@ class Scenario(StrictModel):
         return self.bandwidth.oversample if self.bandwidth else 8 if self.jitter else 1
 
     def shorter(self, rest_s: float, motion_s: float) -> Scenario:
-        """The same with recordings no longer than these, s; stretches of faults and motion shrink with them."""
+        """The same with recordings no longer than these, s; faults and gaps shrink with them."""
         rest, length = min(self.rest_s, rest_s), min(self.motion_s, motion_s)
         share = length / self.motion_s
 
@@ -221,7 +222,9 @@ class Scenario(StrictModel):
         motion = self.motion.model_copy(
             update={"start_s": scaled(self.motion.start_s), "stop_s": scaled(self.motion.stop_s)}
         )
-        return self.model_copy(update={"rest_s": rest, "motion_s": length, "faults": faults, "motion": motion})
+        gaps = self.gaps and self.gaps.model_copy(update={"count": math.ceil(self.gaps.count * share)})
+        short = {"rest_s": rest, "motion_s": length, "faults": faults, "motion": motion, "gaps": gaps}
+        return self.model_copy(update=short)
 
 
 def names() -> list[str]:

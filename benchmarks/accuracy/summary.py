@@ -1,0 +1,200 @@
+"""Rows of single trials → a cell for each line (scenario and recording) and method, ranks, and what must hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+Row = dict[str, Any]
+MEASURES = ("sd", "sd_1s", "rms", "rms_1s")
+YARDSTICKS = ("average", "best_gyro", "oracle")
+CONFIDENCE = 0.95
+RECOMMENDED = ("recommended", "recommended_unsmoothed")
+TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Interval:
+    """value, and its limits at 95 % over the seeds; NaN with one seed"""
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One method on one line.
+
+    over : (yardstick, measure) → geometric mean over the seeds of the ratio of the errors;  nees : mean, of those that
+    ran;  ran : of `seeds`;  note : why it did not run
+    """
+
+    method: str
+    over: dict[tuple[str, str], Interval]
+    nees: Interval
+    coverage: float
+    cpu_s: float
+    ran: int
+    seeds: int
+    state: str
+    note: str
+
+    @property
+    def whole(self) -> bool:
+        """Did it run on every seed?"""
+        return self.ran == self.seeds
+
+    def ratio(self, measure: str, yardstick: str = "average") -> float:
+        """Error over a yardstick's; infinite where the method did not run on every seed."""
+        return self.over[yardstick, measure].value if self.whole else math.inf
+
+
+@dataclass(frozen=True)
+class Line:
+    """One recording of one scenario.
+
+    oracle : its errors over those of the average, measure by measure, and under "nees" its NEES;  exact : see Scenario
+    faults : sums over the seeds: those of scores.FaultScore, and right: trials;  average_counts : false where a
+    gyro without a rate brings the average nearer to the truth
+    """
+
+    scenario: str
+    part: str
+    seeds: int
+    exact: bool
+    average_counts: bool
+    oracle: dict[str, float]
+    faults: dict[str, int]
+    cells: dict[str, Cell]
+
+    @property
+    def label(self) -> str:
+        """Name in tables."""
+        return self.scenario if self.part == "motion" else f"{self.scenario}, at rest"
+
+    def best(self, measure: str, among: Callable[[str], bool]) -> Cell | None:
+        """The method of least error of those that ran on every seed."""
+        known = [cell for name, cell in self.cells.items() if among(name) and math.isfinite(cell.ratio(measure))]
+        return min(known, key=lambda cell: cell.ratio(measure), default=None)
+
+    def ours(self, measure: str) -> Cell | None:
+        """Recommended or its unsmoothed form, whichever is better."""
+        return self.best(measure, lambda name: name in RECOMMENDED)
+
+    def other(self, measure: str) -> Cell | None:
+        """The best of all other methods."""
+        return self.best(measure, lambda name: name not in RECOMMENDED)
+
+
+def summarised(rows: Iterable[Row]) -> list[Line]:
+    """Lines in the order of the rows."""
+    lines: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        lines.setdefault((row["scenario"], row["part"]), []).append(row)
+    return [_line(scenario, part, found) for (scenario, part), found in lines.items()]
+
+
+def _line(scenario: str, part: str, rows: list[Row]) -> Line:
+    methods: dict[str, list[Row]] = {}
+    for row in rows:
+        methods.setdefault(row["method"], []).append(row)
+    trials = list({row["seed"]: row for row in rows}.values())
+    oracle = {
+        name: geometric([one[f"oracle_{name}"] / one[f"average_{name}"] for one in trials]).value for name in MEASURES
+    }
+    oracle["nees"] = float(np.mean([one["oracle_nees"] for one in trials]))
+    names = ("true", "found", "named", "stray", "invented", "excused", "events", "right")
+    faults = {name: sum(int(one.get(f"faults_{name}") or 0) for one in trials) for name in names}
+    cells = {name: _cell(name, found) for name, found in methods.items() if found[0]["state"] != "left out"}
+    exact, fair = trials[0]["oracle_kind"] == "exact", not trials[0]["spoilt_average"]
+    return Line(scenario, part, len(trials), exact, fair, oracle, faults, cells)
+
+
+def _cell(method: str, rows: list[Row]) -> Cell:
+    ran = [row for row in rows if row["state"] == "ran"]
+    broken = next((row for row in rows if row["state"] != "ran"), None)
+    over = {
+        (who, name): geometric([row[name] / max(row[f"{who}_{name}"], TINY) for row in ran])
+        for who in YARDSTICKS
+        for name in MEASURES
+    }
+    nees = arithmetic([row["nees"] for row in ran])
+    coverage, cpu = (float(np.mean([row[name] for row in ran])) if ran else math.nan for name in ("coverage", "cpu_s"))
+    state, note = (broken["state"], broken["note"]) if broken else ("ran", "")
+    return Cell(method, over, nees, coverage, cpu, len(ran), len(rows), state, note)
+
+
+def geometric(values: Sequence[float]) -> Interval:
+    """Geometric mean and its limits, from Student's t of the logarithms."""
+    if not values:
+        return Interval(math.nan)
+    logs = arithmetic(np.log(np.maximum(values, TINY)).tolist())
+    return Interval(*(math.exp(one) for one in (logs.value, logs.low, logs.high)))
+
+
+def arithmetic(values: Sequence[float]) -> Interval:
+    """Mean and its limits, from Student's t."""
+    if not values:
+        return Interval(math.nan)
+    mean = float(np.mean(values))
+    if len(values) < 2:
+        return Interval(mean)
+    half = float(student.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    return Interval(mean, mean - half, mean + half)
+
+
+@dataclass(frozen=True)
+class Rank:
+    """A method over all lines. mean : of its ranks;  first : lines on which it is best or within 3 % of it
+
+    typical, worst : geometric mean and largest of its errors over the average's;  ran : lines;  cpu_s : mean of a trial
+    """
+
+    method: str
+    mean: float
+    first: int
+    typical: float
+    worst: float
+    worst_on: str
+    ran: int
+    cpu_s: float
+
+
+WITHIN = 1.03
+
+
+def ranks(lines: Sequence[Line], measure: str) -> list[Rank]:
+    """Methods by their mean rank. Equal errors share a rank; who did not run is last."""
+    names = list(dict.fromkeys(name for line in lines for name in line.cells))
+    places: dict[str, list[float]] = {name: [] for name in names}
+    first = dict.fromkeys(names, 0)
+    for line in lines:
+        ratio = {name: line.cells[name].ratio(measure) if name in line.cells else math.inf for name in names}
+        least = min(ratio.values())
+        ordered = sorted(names, key=lambda name: ratio[name])
+        before = 0
+        for _, tied in groupby(ordered, key=lambda name: ratio[name]):
+            group = list(tied)
+            for name in group:
+                places[name].append(before + (len(group) + 1) / 2)
+                first[name] += bool(ratio[name] <= WITHIN * least)
+            before += len(group)
+    found = [_rank(name, lines, measure, float(np.mean(places[name])), first[name]) for name in names]
+    return sorted(found, key=lambda one: one.mean)
+
+
+def _rank(name: str, lines: Sequence[Line], measure: str, mean: float, first: int) -> Rank:
+    there = [line for line in lines if name in line.cells and line.cells[name].whole]
+    ratio = {line.label: line.cells[name].ratio(measure) for line in there}
+    worst = max(ratio, key=lambda label: ratio[label], default="")
+    cpu = float(np.mean([line.cells[name].cpu_s for line in there])) if there else math.nan
+    return Rank(
+        name, mean, first, geometric(list(ratio.values())).value, ratio.get(worst, math.nan), worst, len(there), cpu
+    )
