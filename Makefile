@@ -13,7 +13,7 @@ NATIVE := $(wildcard vgyro/engine/native/*.pyx vgyro/engine/native/c/*)
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help env run test test-full lint papers lock clean
+.PHONY: help env run test test-full lint papers accuracy lock clean
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## / \t/' | expand -t 12
@@ -53,6 +53,9 @@ papers: $(READY)  ## the tables of the two papers, regenerated
 	@echo
 	@echo "The papers' tables (simulated data):  $(CURDIR)/reports/papers/jiang2012.html"
 	@echo "                                      $(CURDIR)/reports/papers/liu2015.html"
+
+accuracy: $(READY)  ## the accuracy of every fusion method on simulated recordings: docs/accuracy.md
+	python -m benchmarks.accuracy --processes $(CORES) --docs
 
 lock: $(READY)  ## resolve the dependencies again
 	uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --upgrade \

@@ -18,11 +18,14 @@ from benchmarks.accuracy.summary import RECOMMENDED, Line
 
 PATH = Path(__file__).parent / "bounds.yaml"
 MARGIN, NEES_MARGIN = 1.01, 1.03
-FAULTS = ("found", "named", "stray", "invented", "excused")
+LUCK = (0.6, 1.6)
+"""NEES of an honest s.d. in one short recording: the common bias is one number in it."""
+FAULTS = {"found": "least", "named": "most", "stray": "most", "invented": "most", "excused": "most"}
 HEAD = """\
 # Bounds of `python -m benchmarks.accuracy --quick`, line by line; written by --set-bounds, compared by a test.
 # recommended, recommended_unsmoothed: largest error over the plain average's, [s.d. at full rate, s.d. of 1 s means];
-# nees: least and largest; faults: what the search found, exactly. null: it did not run, or was not stated.
+# nees: least and largest; faults: least that are found, most events of other sorts (benchmarks/accuracy/scores.py).
+# null: it did not run, or was not stated.
 """
 Bounds = dict[str, dict[str, Any]]
 
@@ -38,7 +41,9 @@ def _of_line(line: Line) -> dict[str, Any]:
         ratios = [line.cells[name].ratio(measure) for measure in JUDGED]
         found[name] = [_up(ratio * MARGIN) for ratio in ratios] if math.isfinite(ratios[0]) else None
     nees = line.cells["recommended"].nees.value
-    found["nees"] = [_down(nees / NEES_MARGIN), _up(nees * NEES_MARGIN)] if math.isfinite(nees) else None
+    found["nees"] = None
+    if math.isfinite(nees):
+        found["nees"] = [min(LUCK[0], _down(nees / NEES_MARGIN)), max(LUCK[1], _up(nees * NEES_MARGIN))]
     found["faults"] = {name: line.faults[name] for name in FAULTS}
     return found
 
@@ -79,8 +84,9 @@ def _broken(line: Line, bound: dict[str, Any] | None) -> Iterator[str]:
     if bound["nees"] is not None and not bound["nees"][0] <= nees <= bound["nees"][1]:
         yield f"{line.label}: NEES {figure(nees)}, between {bound['nees'][0]:g} and {bound['nees'][1]:g}"
     for name, count in bound["faults"].items():
-        if line.faults[name] != count:
-            yield f"{line.label}: faults {name} {line.faults[name]}, not {count}"
+        side, seen = FAULTS[name], line.faults[name]
+        if seen < count if side == "least" else seen > count:
+            yield f"{line.label}: faults {name} {seen}, at {side} {count}"
 
 
 def read(path: Path = PATH) -> Bounds:

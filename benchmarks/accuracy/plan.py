@@ -20,22 +20,25 @@ OURS = ("recommended_unsmoothed", "recommended")
 
 @dataclass(frozen=True)
 class Task:
-    """One scenario with its seeds.  methods () : all;  without : parts of `recommended` that are left out"""
+    """One scenario with its seeds.
+
+    methods () : all;  variants : parts of `recommended` that are left out, one run each
+    """
 
     scenario: Scenario
     seeds: tuple[int, ...]
     methods: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()
+    variants: tuple[tuple[str, ...], ...] = ((),)
 
     @property
     def label(self) -> str:
         """Name of its file."""
-        return "-".join([self.scenario.name, *(f"no_{part}" for part in self.without)])
+        return self.scenario.name if self.variants == ((),) else f"{self.scenario.name}-parts"
 
     @property
     def digest(self) -> str:
         """Changes with whatever changes the results: the task itself, and the sources of vgyro and of the benchmark."""
-        record = [self.scenario.model_dump(mode="json"), self.seeds, self.methods, self.without, _sources()]
+        record = [self.scenario.model_dump(mode="json"), self.seeds, self.methods, self.variants, _sources()]
         return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -43,17 +46,17 @@ def tasks(
     only: Sequence[str] = (),
     seeds: Sequence[int] = tuple(range(1, SEEDS + 1)),
     methods: Sequence[str] = (),
-    without: Sequence[str] = (),
+    variants: Sequence[Sequence[str]] = ((),),
     quick: bool = False,
 ) -> list[Task]:
     """A task a scenario.  quick : one seed, short recordings, few methods"""
-    found = []
+    found, left = [], tuple(tuple(one) for one in variants)
     for name in only or names():
         scenario = load(name)
         if quick:
             scenario = scenario.shorter(QUICK_REST_S, QUICK_MOTION_S)
         chosen = tuple(methods or (QUICK_METHODS if quick else ()))
-        found.append(Task(scenario, tuple(seeds[:1] if quick else seeds), chosen, tuple(without)))
+        found.append(Task(scenario, tuple(seeds[:1] if quick else seeds), chosen, left))
     return found
 
 

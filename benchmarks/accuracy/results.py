@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from benchmarks.accuracy.plan import Task
-from benchmarks.accuracy.run import score
+from benchmarks.accuracy.run import score_variants
 
 Row = dict[str, Any]
 DIGEST = b"digest"
@@ -43,9 +43,9 @@ def run_all(chosen: Sequence[Task], folder: Path, processes: int) -> list[Row]:
 
 def _run(task: Task, path: Path) -> str:
     """One task; its label."""
-    rows = [row for seed in task.seeds for row in score(task.scenario, seed, task.methods, frozenset(task.without))]
-    without = {"without": " ".join(task.without)}
-    write(path, [row | without for row in rows], task.digest)
+    variants = [frozenset(one) for one in task.variants]
+    scored = [score_variants(task.scenario, seed, task.methods, variants) for seed in task.seeds]
+    write(path, [row for rows in scored for row in rows], task.digest)
     return task.label
 
 

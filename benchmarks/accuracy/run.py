@@ -48,19 +48,24 @@ class PartArrays:
     parameters: FilterParameters
     search_note: str
 
+    def without(self, parts: frozenset[str]) -> PartArrays:
+        """The same for a run without some parts of `recommended`, in which nothing is known yet of the array."""
+        if not parts:
+            return self
+        faults = () if "faults" in parts else self.array.faults
+        array = replace(self.array, faults=faults)
+        return replace(self, array=array, parameters=replace(self.parameters, without=parts))
 
-def trial_arrays(trial: Trial, without: frozenset[str] = frozenset()) -> dict[str, PartArrays]:
-    """Part ("motion", "rest") → what the pipeline would hand to the methods.
 
-    without : parts of `recommended` that are left out; without "faults" nothing is looked for
-    """
+def trial_arrays(trial: Trial) -> dict[str, PartArrays]:
+    """Part ("motion", "rest") → what the pipeline would hand to the methods."""
     recordings = {"motion": trial.motion, **({"rest": trial.rest} if trial.rest is not None else {})}
     wanted = {part: one for part, one in recordings.items() if part in trial.scenario.score}
     noise = _noise(trial)
-    return {part: _arrays(one, noise, without) for part, one in wanted.items()}
+    return {part: _arrays(one, noise) for part, one in wanted.items()}
 
 
-def _arrays(recording: Recording, noise: ArrayNoise, without: frozenset[str]) -> PartArrays:
+def _arrays(recording: Recording, noise: ArrayNoise) -> PartArrays:
     rate = recording.rate.copy(order="F")
     missing = fill_missing(rate, recording.rate_hz)
     at_rest = np.full(len(rate), recording.kind == "static")
@@ -71,13 +76,10 @@ def _arrays(recording: Recording, noise: ArrayNoise, without: frozenset[str]) ->
         stretch_time=recording.stretch_time, missing=missing,
     )  # fmt: skip
     parameters = FilterParameters.of(FusionOptions(), in_motion(recording.kind, at_rest, moved=False))
-    note = "left out"
-    if "faults" not in without:
-        zero = np.zeros((rate.shape[1], 2))
-        unknown = replace(array, noise=_unknown(rate.shape[1]))
-        search = search_faults(unknown, FaultOptions(), zero, in_hand=recording.kind == "free")
-        array, note = replace(array, faults=tuple(search.events)), search.note
-    return PartArrays(recording, array, replace(parameters, without=without), note)
+    zero = np.zeros((rate.shape[1], 2))
+    unknown = replace(array, noise=_unknown(rate.shape[1]))
+    search = search_faults(unknown, FaultOptions(), zero, in_hand=recording.kind == "free")
+    return PartArrays(recording, replace(array, faults=tuple(search.events)), parameters, search.note)
 
 
 def _unknown(gyros: int) -> ArrayNoise:
@@ -118,20 +120,29 @@ def score(
 
     methods : names of METHODS, () : all;  without : parts of `recommended` that are left out
     """
+    return score_variants(scenario, seed, methods, [without])
+
+
+def score_variants(
+    scenario: Scenario | str, seed: int, methods: Sequence[str], variants: Sequence[frozenset[str]]
+) -> list[Row]:
+    """The same for several sets of parts that are left out; each row says which, in `without`."""
     trial = simulate(scenario, seed)
     LEDGER.clear()
     chosen = select(list(methods or METHODS))
     try:
-        arrays = trial_arrays(trial, without)
+        arrays = trial_arrays(trial)
     except Exception as reason:  # Noise or faults fail: so would every method.
         note = f"before any method: {type(reason).__name__}: {reason}"
-        arrays, failed = {}, [_row(method, "failed", note) for method in chosen]
         parts = {part: getattr(trial, part) for part in trial.scenario.score}
-        return [_about(trial, part) | _yardsticks(trial, one) | row for part, one in parts.items() for row in failed]
+        common = [_about(trial, part) | _yardsticks(trial, one) | {"without": ""} for part, one in parts.items()]
+        return [about | _row(method, "failed", note) for about in common for method in chosen]
     rows = []
     for part, known in arrays.items():
-        common = _about(trial, part) | _yardsticks(trial, known.recording, known.array.rate) | _faults(trial, known)
-        rows += [common | row for row in _outcomes(known, chosen)]
+        common_row = _about(trial, part) | _yardsticks(trial, known.recording, known.array.rate) | _faults(trial, known)
+        for without in variants:
+            left = {"without": " ".join(sorted(without))}
+            rows += [common_row | left | row for row in _outcomes(known.without(without), chosen)]
     return rows
 
 

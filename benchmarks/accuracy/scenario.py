@@ -217,7 +217,14 @@ class Scenario(StrictModel):
             return None if seconds is None else seconds * share
 
         faults = tuple(
-            one.model_copy(update={"start_s": scaled(one.start_s), "stop_s": scaled(one.stop_s)}) for one in self.faults
+            one.model_copy(
+                update={
+                    "start_s": scaled(one.start_s),
+                    "stop_s": scaled(one.stop_s),
+                    "count": math.ceil(one.count * share),
+                }
+            )
+            for one in self.faults
         )
         motion = self.motion.model_copy(
             update={"start_s": scaled(self.motion.start_s), "stop_s": scaled(self.motion.stop_s)}

@@ -61,6 +61,7 @@ class Line:
     """One recording of one scenario.
 
     oracle : its errors over those of the average, measure by measure, and under "nees" its NEES;  exact : see Scenario
+    best_gyro : the same of the best gyro by itself
     faults : sums over the seeds: those of scores.FaultScore, and right: trials;  average_counts : false where a
     gyro without a rate brings the average nearer to the truth
     """
@@ -71,6 +72,7 @@ class Line:
     exact: bool
     average_counts: bool
     oracle: dict[str, float]
+    best_gyro: dict[str, float]
     faults: dict[str, int]
     cells: dict[str, Cell]
 
@@ -106,15 +108,16 @@ def _line(scenario: str, part: str, rows: list[Row]) -> Line:
     for row in rows:
         methods.setdefault(row["method"], []).append(row)
     trials = list({row["seed"]: row for row in rows}.values())
-    oracle = {
-        name: geometric([one[f"oracle_{name}"] / one[f"average_{name}"] for one in trials]).value for name in MEASURES
-    }
+    oracle, single = (
+        {name: geometric([one[f"{who}_{name}"] / one[f"average_{name}"] for one in trials]).value for name in MEASURES}
+        for who in ("oracle", "best_gyro")
+    )
     oracle["nees"] = float(np.mean([one["oracle_nees"] for one in trials]))
     names = ("true", "found", "named", "stray", "invented", "excused", "events", "right")
     faults = {name: sum(int(one.get(f"faults_{name}") or 0) for one in trials) for name in names}
     cells = {name: _cell(name, found) for name, found in methods.items() if found[0]["state"] != "left out"}
     exact, fair = trials[0]["oracle_kind"] == "exact", not trials[0]["spoilt_average"]
-    return Line(scenario, part, len(trials), exact, fair, oracle, faults, cells)
+    return Line(scenario, part, len(trials), exact, fair, oracle, single, faults, cells)
 
 
 def _cell(method: str, rows: list[Row]) -> Cell:
@@ -170,8 +173,14 @@ class Rank:
 WITHIN = 1.03
 
 
+def ranked_on(lines: Sequence[Line]) -> list[Line]:
+    """The lines that ranks are made of: not those on which a gyro without a rate flatters the average."""
+    return [line for line in lines if line.average_counts]
+
+
 def ranks(lines: Sequence[Line], measure: str) -> list[Rank]:
-    """Methods by their mean rank. Equal errors share a rank; who did not run is last."""
+    """Methods by their mean rank over ranked_on(lines). Equal errors share a rank; who did not run is last."""
+    lines = ranked_on(lines)
     names = list(dict.fromkeys(name for line in lines for name in line.cells))
     places: dict[str, list[float]] = {name: [] for name in names}
     first = dict.fromkeys(names, 0)
