@@ -19,7 +19,7 @@ from vgyro.units import arw_deg_s_rt_hz
 from vgyro.validation import did_you_mean
 
 T = TypeVar("T")
-Family = Literal["baseline", "paper", "ours"]
+Family = Literal["baseline", "paper", "ours", "other"]
 
 WeightKey = tuple[str, str, str]
 """model (dcc, ccc), mode (in_sample, causal), definition of r_t"""
@@ -30,6 +30,22 @@ class CannotRun(DataError):
 
 
 @dataclass(frozen=True)
+class AllanScales:
+    """Allan covariances of N gyros at rest, at averaging times that double: 1, 2, 4, … samples.
+
+    tau        : array [J], s, rising
+    covariance : array [J, N, N], (deg/s)², C_ij(τ) = ½⟨d_i d_j⟩, d the difference of adjacent means over τ; NaN in the
+                 row and column of a gyro that had too few values
+    pairs      : array [J], how many pairs of adjacent means over τ the record has side by side: about the degrees of
+                 freedom of each estimate
+    """
+
+    tau: np.ndarray
+    covariance: np.ndarray
+    pairs: np.ndarray
+
+
+@dataclass(frozen=True)
 class ArrayNoise:
     """Noise of the gyros of one array.
 
@@ -37,12 +53,14 @@ class ArrayNoise:
     rrw         : array [N], deg/s/√s; NaN where it was not measured, 0 where none was found
     correlation : array [N, N] of the noise, unit diagonal
     rrw_note    : what to know of the rate random walks
+    scales      : Allan covariances over the averaging time; None: no record at rest was long enough
     """
 
     arw: np.ndarray
     rrw: np.ndarray
     correlation: np.ndarray
     rrw_note: str = ""
+    scales: AllanScales | None = None
 
     @property
     def R(self) -> np.ndarray:
@@ -252,15 +270,16 @@ class Method:
     """One way to make one rate of many: an entry of vgyro.fusion.METHODS.
 
     causal : sample t uses nothing later than t; noise coefficients count as known beforehand
-    needs  : what it takes beside the rates: "arw", "rrw" (of every gyro), "correlation", "weights" (of
-             vgyro.volatility), "faults" (of vgyro.fusion.faults)
+    needs  : what it takes beside the rates: "arw", "rrw" (of every gyro), "correlation", "scales" (Allan covariances
+             at rest), "weights" (of vgyro.volatility), "faults" (of vgyro.fusion.faults)
     fuse   : (ArrayRates, FilterParameters) → Fused;  raises CannotRun, with the reason
     per_definition : it runs once for each definition of r_t
     same_at_any_rate : definition ("" of a method without) → why a constant rate, added to all gyros, adds itself to the
                        fused rate and changes nothing else. What is not in it is run again with such a rate
-    family     : baseline, of a paper, or ours
+    family     : baseline, of a paper, ours, or of another package
     operations : N gyros → floating-point operations a sample, all passes; what is done once a recording is left out
     inferred   : what its paper does not say, or could not be read, and how it was filled in
+    package    : name and version of the package that brings it (vgyro.fusion.packages); empty: it is of vgyro
     """
 
     name: str
@@ -274,3 +293,4 @@ class Method:
     family: Family = "paper"
     operations: Callable[[int], float] = _not_counted
     inferred: str = ""
+    package: str = ""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from vgyro.metrics.pairs import noise_from_differences
     from vgyro.metrics.readings import counted, moments, paper_readings
     from vgyro.metrics.sampling import Sampling
+    from vgyro.metrics.scales import Scales, allan_scales
     from vgyro.metrics.spectrum import Density, Spectrum, flat_band, noise_density, spectral_density, thinned
     from vgyro.metrics.static_figures import StaticFigures, array_figures
     from vgyro.metrics.static_series import Measured, RestRecording, without_means, without_outliers
@@ -45,11 +46,13 @@ __all__ = [
     "Resampled",
     "RestRecording",
     "Sampling",
+    "Scales",
     "Spectrum",
     "StaticFigures",
     "Tone",
     "Units",
     "allan_deviation",
+    "allan_scales",
     "array_figures",
     "averaging_factors",
     "block_length",
@@ -93,6 +96,7 @@ __getattr__ = lazy_exports(
         **dict.fromkeys(("Coefficient", "NoiseCoefficients", "model_deviation", "noise_coefficients"), "coefficients"),
         **dict.fromkeys(("Correlation", "correlation_matrix"), "correlation"),
         **dict.fromkeys(("CrossAllan", "cross_allan"), "allan_covariance"),
+        **dict.fromkeys(("Scales", "allan_scales"), "scales"),
         **dict.fromkeys(("DynamicErrors", "dynamic_errors"), "dynamic"),
         **dict.fromkeys(("Equaliser", "LowPass", "common_bandwidth", "run_back"), "equal_bandwidth"),
         **dict.fromkeys(("FIGURES", "Figure", "Reading"), "figures"),

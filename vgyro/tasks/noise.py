@@ -19,7 +19,9 @@ from vgyro.metrics import (
     Coefficient,
     NoiseCoefficients,
     Sampling,
+    Scales,
     allan_deviation,
+    allan_scales,
     cleaned_of,
     correlation_of,
     noise_coefficients,
@@ -40,7 +42,8 @@ LONG_ENOUGH = 30  # samples
 class ArrayNoiseRecord:
     """What is written: N deg/s/√Hz (two-sided) and K deg/s/√s with limits, correlation [N, N], and how it was found.
 
-    read : σ(1 s) of each gyro, deg/s/√Hz, which stands in for N where the fit does not hold
+    read   : σ(1 s) of each gyro, deg/s/√Hz, which stands in for N where the fit does not hold
+    scales : Allan covariances of the gyros at rest; None: not known
     """
 
     method: str
@@ -48,6 +51,7 @@ class ArrayNoiseRecord:
     coefficients: list[NoiseCoefficients]
     read: list[float]
     correlation: np.ndarray
+    scales: Scales | None = None
 
 
 def main(task: Task) -> None:
@@ -122,7 +126,16 @@ def noise_at_rest(
 
     columns = replace(gyros, cleaned=cleaned)
     correlation = correlation_of(columns, lacking, rate_hz, sampling.stretch, options.confidence).value
-    return ArrayNoiseRecord("samples at rest", len(segment) / rate_hz, fits, read, correlation)
+    scales = _scales(columns, sampling, engine, lacking)
+    return ArrayNoiseRecord("samples at rest", len(segment) / rate_hz, fits, read, correlation, scales)
+
+
+def _scales(columns: Sequence[np.ndarray], sampling: Sampling, engine: str, lacking: Sequence[int]) -> Scales | None:
+    try:
+        return allan_scales(columns, sampling, engine, lacking)
+    except TooShort as reason:
+        logging.warning("no Allan covariances: %s", reason)
+        return None
 
 
 def noise_in_motion(series: Sequence[np.ndarray], frame: ArrayFile, engine: str) -> ArrayNoiseRecord:
@@ -155,7 +168,12 @@ def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: s
         "method": found.method,
         "seconds": found.seconds,
         "gyros": gyros,
-        "units": {"arw": "deg/s/√Hz, two-sided", "rrw": "deg/s/√s", "bias_instability": "deg/s"},
+        "units": {
+            "arw": "deg/s/√Hz, two-sided",
+            "rrw": "deg/s/√s",
+            "bias_instability": "deg/s",
+            "allan_covariance": "(deg/s)²",
+        },
         "arw": {gyro: _number(value) for gyro, (value, _) in arw.items()},
         "arw_source": {gyro: source for gyro, (_, source) in arw.items()},
         "arw_low": {gyro: _number(fit.N.low) for gyro, fit in fits.items()},
@@ -167,7 +185,16 @@ def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: s
         "rrw_high": {gyro: _number(fit.K.high) for gyro, fit in fits.items()},
         "bias_instability": {gyro: _number(fit.B.value) for gyro, fit in fits.items()},
         "correlation": [[float(value) for value in row] for row in correlation],
+        **_scales_record(found.scales),
     }
+
+
+def _scales_record(scales: Scales | None) -> dict[str, Any]:
+    """allan_tau [J] s, allan_covariance [J, N, N] (deg/s)², null for a gyro with too few values, allan_pairs [J]."""
+    if scales is None:
+        return {}
+    covariance = [[[_number(value) for value in row] for row in matrix] for matrix in scales.covariance]
+    return {"allan_tau": scales.tau.tolist(), "allan_covariance": covariance, "allan_pairs": scales.pairs.tolist()}
 
 
 def _usable_arw(fit: NoiseCoefficients, read: float) -> tuple[float, str]:

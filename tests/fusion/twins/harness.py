@@ -26,6 +26,7 @@ from vgyro.simulate import Simulated, Twin, parse_twin, simulate_recording, trut
 from vgyro.simulate.noise import correlation_matrix, pole_of_motion
 from vgyro.simulate.twin import pole_of
 from vgyro.storage.inputs import read_board
+from vgyro.tasks.fusion_inputs import noise_of_record
 from vgyro.tasks.noise import noise_at_rest, record_of
 from vgyro.volatility import block_means
 from vgyro.volatility.fits import fit_windows, window_models
@@ -173,9 +174,7 @@ def _noise(text: str, seed: int) -> ArrayNoise:
     sampling = Sampling.of(simulated.rate_hz, np.zeros(len(simulated.time), dtype=np.int32))
     options = MetricsOptions(bootstrap=50)
     found = noise_at_rest(Columns(simulated.rates - calibrated_bias(twin)), sampling, options, "native")
-    record = record_of(found, gyros, "z", still)
-    arw, rrw = (np.array([record[name][gyro] for gyro in gyros], dtype=float) for name in ("arw", "rrw"))
-    return ArrayNoise(arw, rrw, np.array(record["correlation"]))
+    return noise_of_record(record_of(found, gyros, "z", still), gyros)
 
 
 def with_weights(array: ArrayRates, time: np.ndarray, options: VolatilityOptions) -> ArrayRates:
