@@ -93,14 +93,18 @@ def _print(lines: Sequence[Line]) -> None:
 
     for line in lines:
         faults = f"faults {line.faults['found']}/{line.faults['true']} invented {line.faults['invented']}"
-        print(f"{line.label}: oracle {figure(line.oracle['sd'])} 1 s {figure(line.oracle['sd_1s'])}; {faults}")
+        oracle = [figure(line.yardstick(line.oracle, kind)) for kind in ("full", "means")]
+        print(f"{line.label}: oracle {oracle[0]} 1 s {oracle[1]}; {faults}")
         for name, cell in line.cells.items():
             told = f"{cell.state}: {cell.note[:90]}"
             if cell.ran:
-                over = {key: figure(value.value) for key, value in cell.over.items()}
+                over = [
+                    f"{figure(line.interval(cell, kind, who).value):>6}"
+                    for who in ("average", "oracle")
+                    for kind in ("full", "means")
+                ]
                 told = (
-                    f"/average {over['average', 'sd']:>6} 1 s {over['average', 'sd_1s']:>6}"
-                    f"  /oracle {over['oracle', 'sd']:>6} 1 s {over['oracle', 'sd_1s']:>6}"
+                    f"/average {over[0]} 1 s {over[1]}  /oracle {over[2]} 1 s {over[3]}"
                     f"  NEES {figure(cell.nees.value):>6} within 95 % {cell.coverage:6.1%}  CPU {cell.cpu_s:6.2f} s"
                     f"{'' if cell.whole else f'  {cell.seeds - cell.ran} of {cell.seeds} did not run'}"
                 )

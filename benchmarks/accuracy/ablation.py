@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from benchmarks.accuracy.summary import RECOMMENDED, Interval, Row, geometric
+from benchmarks.accuracy.summary import COLUMNS, RECOMMENDED, TINY, Interval, Row, geometric
 
 WORTH = 1.02
 """A part brings something on a line where leaving it out costs this much."""
@@ -15,7 +15,8 @@ WORTH = 1.02
 class Change:
     """One method on one line, with and without a part.
 
-    ratio : measure → error without the part over that with it;  nees : with, without;  cpu : seconds without / with
+    ratio : kind of JUDGED → error without the part over that with it;  nees : with, without
+    cpu : seconds without / with
     """
 
     part: str
@@ -53,9 +54,10 @@ def _key(row: Row) -> tuple[str, int, str, str]:
 
 
 def _change(part: str, line: str, method: str, pairs: Sequence[tuple[Row, Row]]) -> Change:
+    columns = COLUMNS[pairs[0][0]["part"]]
     ratio = {
-        name: geometric([without[name] / max(usual[name], 1e-12) for usual, without in pairs])
-        for name in ("sd", "sd_1s")
+        kind: geometric([without[name] / max(usual[name], TINY) for usual, without in pairs])
+        for kind, name in columns.items()
     }
     nees = tuple(sum(pair[place]["nees"] for pair in pairs) / len(pairs) for place in (0, 1))
     cpu = sum(pair[1]["cpu_s"] for pair in pairs) / max(sum(pair[0]["cpu_s"] for pair in pairs), 1e-9)

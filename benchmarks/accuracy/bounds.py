@@ -13,8 +13,8 @@ from typing import Any
 
 import yaml
 
-from benchmarks.accuracy.demands import CALLED, JUDGED, figure
-from benchmarks.accuracy.summary import RECOMMENDED, Line
+from benchmarks.accuracy.demands import CALLED, figure
+from benchmarks.accuracy.summary import JUDGED, RECOMMENDED, Line
 
 PATH = Path(__file__).parent / "bounds.yaml"
 MARGIN, NEES_MARGIN = 1.01, 1.03
@@ -23,7 +23,8 @@ LUCK = (0.6, 1.6)
 FAULTS = {"found": "least", "named": "most", "stray": "most", "invented": "most", "excused": "most"}
 HEAD = """\
 # Bounds of `python -m benchmarks.accuracy --quick`, line by line; written by --set-bounds, compared by a test.
-# recommended, recommended_unsmoothed: largest error over the plain average's, [s.d. at full rate, s.d. of 1 s means];
+# recommended, recommended_unsmoothed: largest error over the plain average's, [at full rate, of 1 s means], s.d.
+# in motion, r.m.s. at rest;
 # nees: least and largest; faults: least that are found, most events of other sorts (benchmarks/accuracy/scores.py).
 # null: it did not run, or was not stated.
 """
@@ -38,7 +39,7 @@ def of_lines(lines: Sequence[Line]) -> Bounds:
 def _of_line(line: Line) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in RECOMMENDED:
-        ratios = [line.cells[name].ratio(measure) for measure in JUDGED]
+        ratios = [line.ratio(name, kind) for kind in JUDGED]
         found[name] = [_up(ratio * MARGIN) for ratio in ratios] if math.isfinite(ratios[0]) else None
     nees = line.cells["recommended"].nees.value
     found["nees"] = None
@@ -75,11 +76,11 @@ def _broken(line: Line, bound: dict[str, Any] | None) -> Iterator[str]:
         return
     for name in RECOMMENDED:
         limits = bound[name]
-        for place, measure in enumerate(JUDGED):
-            ratio = line.cells[name].ratio(measure)
+        for place, kind in enumerate(JUDGED):
+            ratio = line.ratio(name, kind)
             if limits is not None and not ratio <= limits[place]:
                 found = f"{figure(ratio)} × the average, at most {limits[place]:g}"
-                yield f"{line.label}: {name}, {CALLED[measure]}: {found}"
+                yield f"{line.label}: {name}, {CALLED[kind]}: {found}"
     nees = line.cells["recommended"].nees.value
     if bound["nees"] is not None and not bound["nees"][0] <= nees <= bound["nees"][1]:
         yield f"{line.label}: NEES {figure(nees)}, between {bound['nees'][0]:g} and {bound['nees'][1]:g}"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from benchmarks.accuracy.summary import Interval, Row, geometric
+from benchmarks.accuracy.summary import COLUMNS, TINY, Interval, Row, geometric
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One method on one line. ratio : measure → error after over before, on common seeds;  nees : before, after
+    """One method on one line. ratio : kind of JUDGED → error after over before, on common seeds;  nees : before, after
 
     gained, lost : seeds on which it ran only after, only before;  invented : healthy gyros accused, before and after
     """
@@ -42,7 +42,8 @@ def _key(row: Row) -> tuple[str, int, str, str]:
 
 def _difference(line: str, method: str, pairs: Sequence[tuple[Row, Row]]) -> Difference:
     both = [pair for pair in pairs if pair[0]["state"] == pair[1]["state"] == "ran"]
-    ratio = {name: geometric([new[name] / max(old[name], 1e-12) for old, new in both]) for name in ("sd", "sd_1s")}
+    columns = COLUMNS[pairs[0][1]["part"]]
+    ratio = {kind: geometric([new[name] / max(old[name], TINY) for old, new in both]) for kind, name in columns.items()}
     nees = tuple(sum(pair[place]["nees"] for pair in both) / max(len(both), 1) for place in (0, 1))
     cpu = sum(new["cpu_s"] for _, new in both) / max(sum(old["cpu_s"] for old, _ in both), 1e-9)
     ran = [(old["state"] == "ran", new["state"] == "ran") for old, new in pairs]

@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from benchmarks.accuracy.summary import RECOMMENDED, WITHIN, Line, ranked_on
+from benchmarks.accuracy.summary import JUDGED, RECOMMENDED, WITHIN, Line, ranked_on
 
-JUDGED = ("sd", "sd_1s")
-CALLED = {"sd": "full rate", "sd_1s": "1 s means"}
+CALLED = {"full": "full rate", "means": "1 s means"}
 MOST_OVER_AVERAGE = 1.02
 MOST_OVER_ORACLE = 1.06
 NEES = (0.8, 1.25)
@@ -63,30 +62,29 @@ def demands(lines: Sequence[Line]) -> list[Demand]:
 def _over_average(lines: Sequence[Line]) -> Iterator[str]:
     for line in lines:
         for name in RECOMMENDED:
-            for measure in JUDGED:
-                found = line.cells[name].ratio(measure) if name in line.cells else math.inf
+            for kind in JUDGED:
+                found = line.ratio(name, kind)
                 if not found <= MOST_OVER_AVERAGE:
-                    yield f"{line.label}: {name} {figure(found)} ({CALLED[measure]})"
+                    yield f"{line.label}: {name} {figure(found)} ({CALLED[kind]})"
 
 
 def _behind(lines: Sequence[Line]) -> Iterator[str]:
     for line in lines:
-        for measure in JUDGED:
-            ours, other = line.ours(measure), line.other(measure)
-            if other is None:
+        for kind in JUDGED:
+            other = line.other(kind)
+            if not other:
                 continue
-            mine = ours.ratio(measure) if ours else math.inf
-            if not mine <= WITHIN * other.ratio(measure):
-                yield f"{line.label}: {figure(mine / other.ratio(measure))} × {other.method} ({CALLED[measure]})"
+            mine, theirs = line.ratio(line.ours(kind), kind), line.ratio(other, kind)
+            if not mine <= WITHIN * theirs:
+                yield f"{line.label}: {figure(mine / theirs)} × {other} ({CALLED[kind]})"
 
 
 def _over_oracle(lines: Sequence[Line]) -> Iterator[str]:
     for line in lines:
-        for measure in JUDGED:
-            cell = line.cells.get("recommended")
-            found = cell.ratio(measure, "oracle") if cell else math.inf
+        for kind in JUDGED:
+            found = line.ratio("recommended", kind, "oracle")
             if not found <= MOST_OVER_ORACLE:
-                yield f"{line.label}: {figure(found)} ({CALLED[measure]})"
+                yield f"{line.label}: {figure(found)} ({CALLED[kind]})"
 
 
 def _nees(lines: Sequence[Line]) -> Iterator[str]:

@@ -121,6 +121,15 @@ def clipped(rate: np.ndarray, full_scale: Sequence[float]) -> np.ndarray:
     return over
 
 
+def rounded(rate: np.ndarray, quantum: float, seed: int) -> np.ndarray:
+    """rate [T, N] in steps of `quantum`. Zero is no count: where the counts lie is another in each gyro.
+
+    A gyro at rest whose noise is far below a step then says one value that is wrong by as much as half a step.
+    """
+    shift = quantum * (stream(seed, "counts").random(rate.shape[1]) - 0.5)
+    return np.asfortranarray(np.rint((rate - shift) / quantum) * quantum + shift)
+
+
 def kept_samples(gaps: Gaps, seed: int, samples: int, rate_hz: float) -> np.ndarray:
     """bool [T]: false in the gaps."""
     rng, kept = stream(seed, "gaps"), np.ones(samples, dtype=bool)

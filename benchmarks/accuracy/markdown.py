@@ -8,9 +8,9 @@ from pathlib import Path
 
 from benchmarks.accuracy.ablation import Change, PartSummary
 from benchmarks.accuracy.compare import Difference
-from benchmarks.accuracy.demands import CALLED, JUDGED, Demand, demands, figure
+from benchmarks.accuracy.demands import CALLED, Demand, demands, figure
 from benchmarks.accuracy.scenario import load
-from benchmarks.accuracy.summary import RECOMMENDED, Cell, Interval, Line, ranked_on, ranks
+from benchmarks.accuracy.summary import JUDGED, RECOMMENDED, Cell, Interval, Line, ranked_on, ranks
 
 HEAD = Path(__file__).parent / "head.md"
 SHOWN = 6
@@ -24,8 +24,13 @@ def document(
     head = HEAD.read_text(encoding="utf-8").format(
         seeds=f"{seeds} seed{'s' * (seeds != 1)}", lines=len(lines), scenarios=len({line.scenario for line in lines})
     )
-    sections = [head.rstrip(), must_hold(demands(lines)), summary(lines), *(ranking(lines, one) for one in JUDGED)]
-    sections += [matrix(lines, one) for one in JUDGED]
+    sections = [
+        head.rstrip(),
+        must_hold(demands(lines)),
+        summary(lines),
+        *(ranking(lines, one) for one in reversed(JUDGED)),
+    ]
+    sections += [matrix(lines, one) for one in reversed(JUDGED)]
     sections += [not_run(lines)]
     sections += [ablation(parts)] if parts else []
     sections += [comparison(compared)] if compared else []
@@ -51,18 +56,19 @@ def summary(lines: Sequence[Line]) -> str:
     )  # fmt: skip
     rows = [
         "## Summary", "",
-        "Error over that of the plain average: s.d. of 1 s means, with its 95 % interval over the seeds; in brackets"
-        " s.d. at the full rate.", "", _row(head), _row(["---"] * len(head)),
+        "Error over that of the plain average: of 1 s means, with its 95 % interval over the seeds; in brackets at the"
+        " full rate.", "", _row(head), _row(["---"] * len(head)),
     ]  # fmt: skip
     for line in lines:
         ours, bare = (line.cells.get(name) for name in RECOMMENDED)
-        other = line.other("sd_1s")
+        other = line.other("means")
+        oracle, single = (line.yardstick(one, "means") for one in (line.oracle, line.best_gyro))
         rows.append(
             _row([
-                line.label, load(line.scenario).title, _cell(ours), _cell(bare),
-                f"{other.method} {_cell(other)}" if other else "-",
-                f"{figure(line.oracle['sd_1s'])} ({figure(line.oracle['sd'])}) {'' if line.exact else 'bound'}".strip(),
-                figure(line.best_gyro["sd_1s"]), _interval(ours.nees) if ours and ours.ran else "-",
+                line.label, load(line.scenario).title, _cell(line, ours), _cell(line, bare),
+                f"{other} {_cell(line, line.cells[other])}" if other else "-",
+                f"{figure(oracle)} ({figure(line.yardstick(line.oracle, 'full'))}){'' if line.exact else ' bound'}",
+                figure(single), _interval(ours.nees) if ours and ours.ran else "-",
                 f"{ours.coverage:.0%}" if ours and math.isfinite(ours.coverage) else "-", _faults(line),
             ])
         )  # fmt: skip
@@ -78,12 +84,12 @@ def _faults(line: Line) -> str:
     return text + (f", {extra} other events" if extra and not found["invented"] else "")
 
 
-def ranking(lines: Sequence[Line], measure: str) -> str:
+def ranking(lines: Sequence[Line], kind: str) -> str:
     """Methods by mean rank."""
     head = ("method", "mean rank", "best or within 3 %", "typical", "worst", "on", "ran on", "CPU s a trial")
-    rows = [f"## Ranks: s.d., {CALLED[measure]}", "", _row(head), _row(["---"] * len(head))]
+    rows = [f"## Ranks: {CALLED[kind]}", "", _row(head), _row(["---"] * len(head))]
     count = len(ranked_on(lines))
-    for one in ranks(lines, measure):
+    for one in ranks(lines, kind):
         rows.append(
             _row([
                 one.method, f"{one.mean:.1f}", f"{one.first} of {count}", figure(one.typical), figure(one.worst),
@@ -93,20 +99,20 @@ def ranking(lines: Sequence[Line], measure: str) -> str:
     return "\n".join(rows)
 
 
-def matrix(lines: Sequence[Line], measure: str) -> str:
+def matrix(lines: Sequence[Line], kind: str) -> str:
     """Every method on every line."""
     names = list(dict.fromkeys(name for line in lines for name in line.cells))
     legend = ", ".join(f"{place} {name}" for place, name in enumerate(names, start=1))
     rows = [
-        f"## All methods: s.d. over that of the average, {CALLED[measure]}", "", f"Columns: {legend}; O the oracle. The"
+        f"## All methods: error over that of the average, {CALLED[kind]}", "", f"Columns: {legend}; O the oracle. The"
         " best is bold.", "", _row(["line", *(str(place) for place in range(1, len(names) + 1)), "O"]),
         _row(["---"] * (len(names) + 2)),
     ]  # fmt: skip
     for line in lines:
-        ratio = [line.cells[name].ratio(measure) if name in line.cells else math.inf for name in names]
+        ratio = [line.ratio(name, kind) for name in names]
         least = min(ratio)
         texts = [_matrix_cell(line, name, value, least) for name, value in zip(names, ratio, strict=True)]
-        rows.append(_row([line.label, *texts, figure(line.oracle[measure])]))
+        rows.append(_row([line.label, *texts, figure(line.yardstick(line.oracle, kind))]))
     return "\n".join(rows)
 
 
@@ -165,7 +171,7 @@ def comparison(found: Sequence[Difference]) -> str:
         runs = f"{one.gained} gained" * bool(one.gained) + f" **{one.lost} lost**" * bool(one.lost)
         rows.append(
             _row([
-                one.line, one.method, _interval(one.ratio["sd_1s"]), _interval(one.ratio["sd"]),
+                one.line, one.method, _interval(one.ratio["means"]), _interval(one.ratio["full"]),
                 f"{figure(one.nees[0])} → {figure(one.nees[1])}", figure(one.cpu),
                 f"{one.invented[0]} → {one.invented[1]}", runs,
             ])
@@ -173,10 +179,10 @@ def comparison(found: Sequence[Difference]) -> str:
     return "\n".join(rows)
 
 
-def _cell(cell: Cell | None) -> str:
+def _cell(line: Line, cell: Cell | None) -> str:
     if cell is None or not cell.ran:
         return "-"
-    text = f"{_interval(cell.over['average', 'sd_1s'])} ({figure(cell.over['average', 'sd'].value)})"
+    text = f"{_interval(line.interval(cell, 'means'))} ({figure(line.interval(cell, 'full').value)})"
     return text if cell.whole else f"{text}, {cell.seeds - cell.ran} of {cell.seeds} did not run"
 
 

@@ -7,6 +7,7 @@
    poles in a row, (1 - a·B)^p w = e. Its posterior is that of a banded precision matrix: the smoother over all samples.
 The variances of 2 and 3 add up: the rate says next to nothing of the common part of the biases. Between stretches of
 motion the rate is known to be zero, and the samples say everything of the biases: there P = R⁻¹.
+Where all gyros are clipped the rate is beyond the end of their range: the posterior of 3 is cut off there.
 In a recording at rest step 3 is left out: an oracle that knew the rate to be zero would be of no use.
 """
 
@@ -19,6 +20,7 @@ from math import comb
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cholesky_banded, solveh_banded
+from scipy.stats import norm
 
 from benchmarks.accuracy.scenario import Motion, Scenario
 from benchmarks.accuracy.signals import decay_of, delay, on_circle, pole
@@ -66,6 +68,8 @@ def oracle(recording: Recording, scenario: Scenario) -> Estimate:
         variance = 1.0 / np.where(information > 0, information, np.inf)
         return Estimate(combined + known.line, np.sqrt(variance + slow))
     smooth = _smooth(recording, scenario.motion, combined, information)
+    if scenario.full_scale:
+        smooth = _beyond(smooth, information == 0, recording.known.values.mean(axis=1))
     return Estimate(smooth.rate + known.line, np.sqrt(smooth.sd**2 + slow * (known.moving != 0.0)))
 
 
@@ -173,6 +177,21 @@ def _smooth(recording: Recording, motion: Motion, values: np.ndarray, informatio
         off = curve(moments) - estimate[place]
     variance = _inverse_diagonal(band)[place]
     return Estimate(factor * curve(moments), np.abs(factor) * np.sqrt(variance))
+
+
+def _beyond(smooth: Estimate, clipped: np.ndarray, values: np.ndarray) -> Estimate:
+    """The estimate where all gyros are clipped [T] bool: the rate is known to be beyond the end of the range.
+
+    values [T] : what the gyros say there, deg/s.  Mean and s.d. of the normal distribution cut off at that value.
+    """
+    side = np.sign(values[clipped])
+    sd = smooth.sd[clipped]
+    start = (np.abs(values[clipped]) - side * smooth.rate[clipped]) / sd
+    hazard = np.exp(norm.logpdf(start) - norm.logsf(start))
+    rate, known = smooth.rate.copy(), smooth.sd.copy()
+    rate[clipped] = side * (side * smooth.rate[clipped] + sd * hazard)
+    known[clipped] = sd * np.sqrt(np.clip(1.0 + start * hazard - hazard**2, 1e-6, 1.0))
+    return Estimate(rate, known)
 
 
 def _precision(motion: Motion, decay: float, count: int) -> np.ndarray:

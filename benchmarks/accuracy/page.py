@@ -8,9 +8,9 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from benchmarks.accuracy.demands import CALLED, JUDGED, demands, figure
+from benchmarks.accuracy.demands import CALLED, demands, figure
 from benchmarks.accuracy.scenario import load
-from benchmarks.accuracy.summary import RECOMMENDED, Line, ranked_on, ranks
+from benchmarks.accuracy.summary import JUDGED, RECOMMENDED, Line, ranked_on, ranks
 from vgyro.report.colours import DARK, LIGHT
 
 FOLDER = Path(__file__).parent
@@ -35,16 +35,16 @@ def page(lines: Sequence[Line]) -> str:
     )  # fmt: skip
 
 
-def _matrix(lines: Sequence[Line], names: Sequence[str], measure: str) -> list[dict[str, object]]:
+def _matrix(lines: Sequence[Line], names: Sequence[str], kind: str) -> list[dict[str, object]]:
     """Rows of a matrix: label, what differs, and for each method its text and class."""
     rows = []
     for line in lines:
-        ratio = [line.cells[name].ratio(measure) if name in line.cells else math.inf for name in names]
+        ratio = [line.ratio(name, kind) for name in names]
         least = min(ratio)
         cells = [(_text(line, name, value), _shade(value, least)) for name, value in zip(names, ratio, strict=True)]
         rows.append({
             "label": line.label, "title": load(line.scenario).title, "cells": cells,
-            "oracle": figure(line.oracle[measure]), "exact": line.exact,
+            "oracle": figure(line.yardstick(line.oracle, kind)), "exact": line.exact,
         })  # fmt: skip
     return rows
 

@@ -15,6 +15,11 @@ Row = dict[str, Any]
 MEASURES = ("sd", "sd_1s", "rms", "rms_1s")
 YARDSTICKS = ("average", "best_gyro", "oracle")
 CONFIDENCE = 0.95
+JUDGED = ("full", "means")
+"""Errors by which methods are judged: at the full rate, of 1 s means."""
+COLUMNS = {"motion": {"full": "sd", "means": "sd_1s"}, "rest": {"full": "rms", "means": "rms_1s"}}
+"""In motion the s.d.: the common bias of an array, which no method can see, is left out. At rest the r.m.s. error: a
+gyro that repeats one value has no s.d."""
 RECOMMENDED = ("recommended", "recommended_unsmoothed")
 TINY = 1e-12
 
@@ -51,10 +56,6 @@ class Cell:
         """Did it run on every seed?"""
         return self.ran == self.seeds
 
-    def ratio(self, measure: str, yardstick: str = "average") -> float:
-        """Error over a yardstick's; infinite where the method did not run on every seed."""
-        return self.over[yardstick, measure].value if self.whole else math.inf
-
 
 @dataclass(frozen=True)
 class Line:
@@ -81,18 +82,31 @@ class Line:
         """Name in tables."""
         return self.scenario if self.part == "motion" else f"{self.scenario}, at rest"
 
-    def best(self, measure: str, among: Callable[[str], bool]) -> Cell | None:
-        """The method of least error of those that ran on every seed."""
-        known = [cell for name, cell in self.cells.items() if among(name) and math.isfinite(cell.ratio(measure))]
-        return min(known, key=lambda cell: cell.ratio(measure), default=None)
+    def ratio(self, method: str, kind: str, yardstick: str = "average") -> float:
+        """Error of a method over a yardstick's, of a kind in JUDGED; infinite where it did not run on every seed."""
+        cell = self.cells.get(method)
+        return math.inf if cell is None or not cell.whole else self.interval(cell, kind, yardstick).value
 
-    def ours(self, measure: str) -> Cell | None:
+    def interval(self, cell: Cell, kind: str, yardstick: str = "average") -> Interval:
+        """The same with its limits, of the seeds on which it ran."""
+        return cell.over[yardstick, COLUMNS[self.part][kind]]
+
+    def yardstick(self, errors: dict[str, float], kind: str) -> float:
+        """One of `oracle` and `best_gyro`."""
+        return errors[COLUMNS[self.part][kind]]
+
+    def best(self, kind: str, among: Callable[[str], bool]) -> str:
+        """The method of least error of those that ran on every seed; "": none."""
+        known = [name for name in self.cells if among(name) and math.isfinite(self.ratio(name, kind))]
+        return min(known, key=lambda name: self.ratio(name, kind), default="")
+
+    def ours(self, kind: str) -> str:
         """Recommended or its unsmoothed form, whichever is better."""
-        return self.best(measure, lambda name: name in RECOMMENDED)
+        return self.best(kind, lambda name: name in RECOMMENDED)
 
-    def other(self, measure: str) -> Cell | None:
+    def other(self, kind: str) -> str:
         """The best of all other methods."""
-        return self.best(measure, lambda name: name not in RECOMMENDED)
+        return self.best(kind, lambda name: name not in RECOMMENDED)
 
 
 def summarised(rows: Iterable[Row]) -> list[Line]:
@@ -128,7 +142,8 @@ def _cell(method: str, rows: list[Row]) -> Cell:
         for who in YARDSTICKS
         for name in MEASURES
     }
-    nees = arithmetic([row["nees"] for row in ran])
+    mean = arithmetic([row["nees"] for row in ran])
+    nees = Interval(mean.value, mean.low if math.isnan(mean.low) else max(mean.low, 0.0), mean.high)
     coverage, cpu = (float(np.mean([row[name] for row in ran])) if ran else math.nan for name in ("coverage", "cpu_s"))
     state, note = (broken["state"], broken["note"]) if broken else ("ran", "")
     return Cell(method, over, nees, coverage, cpu, len(ran), len(rows), state, note)
@@ -178,14 +193,14 @@ def ranked_on(lines: Sequence[Line]) -> list[Line]:
     return [line for line in lines if line.average_counts]
 
 
-def ranks(lines: Sequence[Line], measure: str) -> list[Rank]:
+def ranks(lines: Sequence[Line], kind: str) -> list[Rank]:
     """Methods by their mean rank over ranked_on(lines). Equal errors share a rank; who did not run is last."""
     lines = ranked_on(lines)
     names = list(dict.fromkeys(name for line in lines for name in line.cells))
     places: dict[str, list[float]] = {name: [] for name in names}
     first = dict.fromkeys(names, 0)
     for line in lines:
-        ratio = {name: line.cells[name].ratio(measure) if name in line.cells else math.inf for name in names}
+        ratio = {name: line.ratio(name, kind) for name in names}
         least = min(ratio.values())
         ordered = sorted(names, key=lambda name: ratio[name])
         before = 0
@@ -195,13 +210,13 @@ def ranks(lines: Sequence[Line], measure: str) -> list[Rank]:
                 places[name].append(before + (len(group) + 1) / 2)
                 first[name] += bool(ratio[name] <= WITHIN * least)
             before += len(group)
-    found = [_rank(name, lines, measure, float(np.mean(places[name])), first[name]) for name in names]
+    found = [_rank(name, lines, kind, float(np.mean(places[name])), first[name]) for name in names]
     return sorted(found, key=lambda one: one.mean)
 
 
-def _rank(name: str, lines: Sequence[Line], measure: str, mean: float, first: int) -> Rank:
+def _rank(name: str, lines: Sequence[Line], kind: str, mean: float, first: int) -> Rank:
     there = [line for line in lines if name in line.cells and line.cells[name].whole]
-    ratio = {line.label: line.cells[name].ratio(measure) for line in there}
+    ratio = {line.label: line.ratio(name, kind) for line in there}
     worst = max(ratio, key=lambda label: ratio[label], default="")
     cpu = float(np.mean([line.cells[name].cpu_s for line in there])) if there else math.nan
     return Rank(

@@ -87,10 +87,16 @@ def lines(*rows: Row) -> list[Line]:
 
 def test_ratios_are_geometric_means_over_the_seeds() -> None:
     [line] = lines(row("a", 1, 0.5), row("a", 2, 2.0), row("b", 1, 0.25), row("b", 2, 0.25))
-    assert line.cells["a"].ratio("sd") == pytest.approx(1.0)
-    assert line.cells["b"].ratio("sd", "oracle") == pytest.approx(1.0)
+    assert line.ratio("a", "full") == pytest.approx(1.0)
+    assert line.ratio("b", "full", "oracle") == pytest.approx(1.0)
     assert line.oracle["sd"] == pytest.approx(0.25)
     assert line.seeds == 2
+
+
+def test_at_rest_the_rms_error_counts() -> None:
+    [line] = lines(row("a", 1, 1.0, part="rest", rms=1.0))
+    assert line.ratio("a", "full") == pytest.approx(0.5)
+    assert line.label == "plain, at rest"
 
 
 def test_the_interval_is_students() -> None:
@@ -102,13 +108,13 @@ def test_the_interval_is_students() -> None:
 def test_who_does_not_run_on_every_seed_is_last() -> None:
     failed = row("b", 2, math.nan, state="failed", note="LinAlgError")
     [line] = lines(row("a", 1, 1.0), row("a", 2, 1.0), row("b", 1, 0.1), failed)
-    assert math.isinf(line.cells["b"].ratio("sd"))
-    assert [one.method for one in ranks([line], "sd")] == ["a", "b"]
+    assert math.isinf(line.ratio("b", "full"))
+    assert [one.method for one in ranks([line], "full")] == ["a", "b"]
     assert line.cells["b"].note == "LinAlgError"
 
 
 def test_equal_errors_share_a_rank() -> None:
-    found = ranks(lines(row("a", 1, 1.0), row("b", 1, 1.0), row("c", 1, 2.0)), "sd")
+    found = ranks(lines(row("a", 1, 1.0), row("b", 1, 1.0), row("c", 1, 2.0)), "full")
     assert [(one.method, one.mean, one.first) for one in found] == [("a", 1.5, 1), ("b", 1.5, 1), ("c", 3.0, 0)]
 
 
@@ -161,7 +167,7 @@ def test_a_part_that_brings_and_one_that_costs() -> None:
 def test_before_and_after() -> None:
     before = [row("a", 1, 1.0, faults_invented=2), row("a", 2, 1.0, state="failed"), row("b", 1, 1.0)]
     [found] = differences(before, [row("a", 1, 0.5), row("a", 2, 0.5), row("c", 1, 1.0)])
-    assert found.ratio["sd"].value == pytest.approx(0.5)
+    assert found.ratio["full"].value == pytest.approx(0.5)
     assert (found.gained, found.lost, found.invented) == (1, 0, (2, 0))
 
 

@@ -143,8 +143,12 @@ def test_coloured_noise_has_the_density_of_the_white_one_at_low_frequency() -> N
 
 def test_rounding_and_clipping() -> None:
     recording = simulate(scenario(quantum=0.5, full_scale=(30.0,) * 6), 1).motion
-    assert np.array_equal(recording.rate, np.rint(recording.rate / 0.5) * 0.5)
-    assert np.abs(recording.rate).max() <= 30.0
+    steps = np.diff(recording.rate, axis=0) / 0.5
+    assert steps == pytest.approx(np.rint(steps), abs=1e-9)
+    rounding = (recording.rate - recording.known.values)[recording.known.usable]
+    assert np.abs(rounding).max() <= 0.25 + 1e-9
+    assert rounding.std() == pytest.approx(0.5 / math.sqrt(12), rel=0.01)
+    assert np.abs(recording.known.values).max() == 30.0
     assert np.array_equal(~recording.known.usable, np.abs(recording.known.values) >= 30.0)
 
 
