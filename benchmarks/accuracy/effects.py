@@ -121,12 +121,12 @@ def clipped(rate: np.ndarray, full_scale: Sequence[float]) -> np.ndarray:
     return over
 
 
-def rounded(rate: np.ndarray, quantum: float, seed: int) -> np.ndarray:
-    """rate [T, N] in steps of `quantum`. Zero is no count: where the counts lie is another in each gyro.
+def rounded(rate: np.ndarray, quantum: float, seed: int, from_zero: bool = False) -> np.ndarray:
+    """rate [T, N] in steps of `quantum`. Unless from_zero, zero is no count: each gyro's counts lie elsewhere.
 
     A gyro at rest whose noise is far below a step then says one value that is wrong by as much as half a step.
     """
-    shift = quantum * (stream(seed, "counts").random(rate.shape[1]) - 0.5)
+    shift = quantum * (stream(seed, "counts").random(rate.shape[1]) - 0.5) * (not from_zero)
     return np.asfortranarray(np.rint((rate - shift) / quantum) * quantum + shift)
 
 

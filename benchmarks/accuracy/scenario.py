@@ -152,7 +152,8 @@ class Scenario(StrictModel):
     title       : what differs from the base;  extends : the scenario that it differs from
     arw, rrw    : white noise deg/s/√Hz (two-sided) and random walk deg/s/√s of each gyro;  bias_sd : deg/s
     rest_s      : length of the rest recording, s; 0: there is none;  motion_s : of the motion
-    quantum     : step of the values, deg/s; 0: none;  full_scale : range of each gyro, deg/s
+    quantum     : step of the values, deg/s; 0: none;  from_zero : zero is a count in every gyro, else anything may be
+    full_scale : range of each gyro, deg/s
     jitter      : the moments of the samples are off by as much as this share of the period, even
     declared_hz : pole that a data sheet gives for all gyros, Hz; None: nothing is declared
     score       : the recordings whose fused rate is judged
@@ -178,6 +179,7 @@ class Scenario(StrictModel):
     temperature: Temperature | None = None
     tilt: Tilt | None = None
     quantum: float = Field(0.0, ge=0)
+    from_zero: bool = False
     full_scale: tuple[float, ...] = ()
     faults: tuple[Fault, ...] = ()
     gaps: Gaps | None = None

@@ -57,7 +57,7 @@ def _recording(scenario: Scenario, seed: int, part: str) -> Recording:
     usable = ~effects.clipped(values, scenario.full_scale)
     rate = values.copy(order="F")
     if scenario.quantum > 0:
-        rate = effects.rounded(rate, scenario.quantum, seed)
+        rate = effects.rounded(rate, scenario.quantum, seed, scenario.from_zero)
     events += effects.break_gyros(rate, usable, faults, scenario, seed)
     known = replace(
         known, deviation=known.deviation * factor, walk=walk, usable=usable, scale=scale, offset=offset, moving=moving,
