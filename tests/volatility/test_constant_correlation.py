@@ -5,6 +5,7 @@ import pymgarch
 import pytest
 from scipy.stats import chi2
 
+from vgyro import engine as engines
 from vgyro.volatility import constant_correlation_test
 
 
@@ -41,13 +42,32 @@ def test_a_long_changing_record_is_rejected(simulator, equicorrelated):
 
 
 def test_where_it_is_not_defined():
+    # Expected by definition; products that are all zero, or that follow from the ones before, leave nothing to regress.
     z = np.random.default_rng(0).standard_normal((100, 2))
-    singular = np.column_stack([z[:, 0], z[:, 0]])
-    for bad in (z[:, :1], singular, z[:3], np.where(np.arange(100)[:, None] == 5, np.nan, z)):
+    turns = np.tile([[1.0, 0.0], [0.0, 1.0]], (50, 1))
+    ramp = np.column_stack([np.tile([1.0, 1.0, -1.0, -1.0], 25), np.tile([1.0, -1.0, -1.0, 1.0], 25)])
+    cases = {
+        "one gyro": z[:, :1],
+        "not positive definite": np.column_stack([z[:, 0], z[:, 0]]),
+        "too short": z[:3],
+        "failed": np.where(np.arange(100)[:, None] == 5, np.nan, z),
+        "no variance": np.column_stack([z[:, 0], np.zeros(100)]),
+    }
+    for status, bad in [*cases.items(), ("degenerate", turns), ("degenerate", ramp)]:
         found = constant_correlation_test(bad)
-        assert np.isnan(found.statistic)
-        assert np.isnan(found.p_value)
-        assert np.isnan(found.p_value_s)
+        assert found.status == status
+        assert np.isnan([found.statistic, found.p_value, found.p_value_s]).all()
+    # Three products cannot tell a constant and five lags apart.
+    assert constant_correlation_test(z[:8], 5).status == "degenerate"
+    assert constant_correlation_test(z).status == "tested"
+
+
+@pytest.mark.parametrize("lags", [1, 2, 5])
+def test_the_engines_agree_where_it_is_degenerate(lags):
+    turns = np.tile([[1.0, 0.0], [0.0, 1.0]], (50, 1))[None]
+    margins = np.ones((1, 2)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2), dtype=np.uint8)
+    for engine in ("native", "reference"):
+        assert np.isnan(engines.get(engine).dcc.fit_dcc_windows(turns, *margins, lags).statistic).all()
 
 
 @pytest.mark.full

@@ -192,6 +192,25 @@ def test_one_gyro_and_short_and_nan(array, engine):
     assert fit_dcc(broken, engine).status == "failed"
 
 
+@pytest.mark.parametrize("engine", ["native", "reference"])
+@pytest.mark.parametrize("value", [0.0, 5.0, -1e-9])
+def test_a_constant_series_has_no_variance(array, engine, value):
+    # Expected: as fit_garch says of it; what is standardised by its model is NaN throughout.
+    r = array[0].copy()
+    r[:, 1] = value
+    margins = fit_garch(r, engine)
+    assert margins.status[1] == "no variance"
+    with np.errstate(invalid="ignore"):
+        z = r / np.sqrt(margins.variance)
+    for found in (fit_dcc(z, engine), fit_dcc(z, engine, r=r, margins=margins), fit_dcc(r, engine), fit_ccc(r, engine)):
+        assert found.status == "no variance"
+        assert (found.a, found.b) == (0.0, 0.0)
+        np.testing.assert_array_equal(found.target, np.eye(4))
+        assert np.isnan([found.log_likelihood, found.log_likelihood_ccc]).all()
+    r[7, 1] = np.nan
+    assert fit_dcc(np.full(z.shape, np.nan), engine, r=r, margins=margins).status == "failed"
+
+
 @pytest.mark.full
 def test_standard_errors_are_honest(simulator, equicorrelated):
     # Expected: the spread of 60 estimates of the same truth.

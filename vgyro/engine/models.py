@@ -21,6 +21,8 @@ TOO_SHORT = "too short"
 NOT_POSITIVE_DEFINITE = "not positive definite"
 ONE_GYRO = "one gyro"
 FAILED = "failed"
+TESTED = "tested"
+DEGENERATE = "degenerate"
 
 GARCH_STATUSES = (
     CONVERGED, ALPHA_ZERO, BETA_ZERO, PERSISTENCE_ONE, OUTLIER_DOMINATED, NO_VARIANCE, TOO_SHORT, FAILED,
@@ -30,9 +32,12 @@ GARCH_STATUSES = (
 
 DCC_STATUSES = (
     CONVERGED, A_ZERO, B_ZERO, SUM_ONE, BOUNDARY_MARGIN, OUTLIER_DOMINATED, NOT_POSITIVE_DEFINITE, ONE_GYRO, TOO_SHORT,
-    FAILED,
+    FAILED, NO_VARIANCE,
 )  # fmt: skip
 """What a fit of DCC(1,1) may end as; a code of DccWindows.status is a place in this tuple."""
+
+TEST_STATUSES = (TESTED, ONE_GYRO, TOO_SHORT, NO_VARIANCE, NOT_POSITIVE_DEFINITE, FAILED, DEGENERATE)
+"""What the test of constant correlation may end as; only `tested` has a statistic."""
 
 PERSISTENCE_MAX = 1 - 1e-6
 """Largest α + β (and a + b) that a fit may return; a fit that reaches it is at the boundary."""
@@ -74,7 +79,9 @@ class DccFit:
     correlation    : [T, N, N] R_t
     status         : one of DCC_STATUSES. boundary margin: a GARCH margin is at its boundary, so there are no two-step
                      standard errors; outlier-dominated: a margin is; not positive definite: S is singular, correlation
-                     is the identity; failed: the optimiser did, a = b = 0
+                     is the identity; no variance: a series does not vary, or is NaN throughout, as its GARCH margin
+                     then is: likewise, without a likelihood; failed: the optimiser did, or a value is not finite,
+                     a = b = 0
     """
 
     a: float

@@ -24,6 +24,8 @@ MIN_SAMPLES = 20
 """A series with fewer samples is not fitted."""
 FLAT = 1e-12
 """A series that varies by less than this share of its size has no variance."""
+PIVOT_MIN = 1e-10
+"""A test is degenerate where a smaller share of a regressor is its own, or is left over of what is explained."""
 ALPHA_NEAR_ZERO = 1e-3
 """α (and a) below this has no usable standard error: β (b) is all but unidentified."""
 BETA_NEAR_ZERO = 1e-6

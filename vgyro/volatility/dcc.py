@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.engine import recursions
-from vgyro.engine.constant import constant_correlation_statistic
+from vgyro.engine.constant import constant_correlation
 from vgyro.engine.models import DccFit, GarchFit
 from vgyro.volatility.garch import _two_dimensional
 
@@ -33,7 +33,8 @@ def fit_dcc(
     identified: a = b = 0, status `boundary: a = 0`. Standard errors are NaN unless the status is `converged`; the
     two-step ones (Engle & Sheppard 2001) hold S fixed; the inverse-Hessian ones take the margins as known and the
     likelihood as right, so that they also exist for `boundary margin`.
-    S singular: status `not positive definite`, and the identity stands for S and for every R_t. N = 1: `one gyro`.
+    S singular: status `not positive definite`, and the identity stands for S and for every R_t. A series that does not
+    vary, or is NaN throughout because its margin found that: `no variance`, likewise, L_c NaN. N = 1: `one gyro`.
     Engle (2002); Liu et al. (2015), eq. 4-13.
     """
     return engines.get(engine).dcc.fit_dcc(_two_dimensional(z), r=r, margins=margins)
@@ -46,12 +47,16 @@ def fit_ccc(z: np.ndarray, engine: str = "native") -> DccFit:
 
 @dataclass(frozen=True)
 class Test:
-    """statistic; dof = lags + 1; p_value under chi²(lags + 1), as published; p_value_s under chi²(lags)."""
+    """statistic; dof = lags + 1; p_value under chi²(lags + 1), as published; p_value_s under chi²(lags).
+
+    status : one of vgyro.engine.models.TEST_STATUSES; all figures are NaN unless it is `tested`
+    """
 
     statistic: float
     dof: int
     p_value: float
     p_value_s: float
+    status: str
 
 
 # pytest would take a class of this name, imported into a test module, for a test.
@@ -63,7 +68,9 @@ def constant_correlation_test(z: np.ndarray, lags: int = 1) -> Test:
 
     z       : [T, N] standardised residuals of the CCC fit
     lags    : s, lags of the regression
-    returns : Test; NaN for one gyro, a singular correlation, or fewer than lags + 3 samples
+    returns : Test; NaN and the reason for one gyro, fewer than lags + 3 samples, a series that does not vary or is not
+              finite, a singular correlation, or products without a regression: their lags depend on each other, or
+              nothing is left over
 
     z is whitened by the symmetric root of the sample correlation; the products above the diagonal of z_t z_t', all
     pairs stacked, are regressed on a constant and s of their own lags; δ'X'Xδ/σ̂² with σ̂² the mean squared residual is
@@ -75,5 +82,5 @@ def constant_correlation_test(z: np.ndarray, lags: int = 1) -> Test:
     """
     from scipy.special import chdtrc
 
-    statistic = constant_correlation_statistic(_two_dimensional(z), lags)
-    return Test(statistic, lags + 1, float(chdtrc(lags + 1, statistic)), float(chdtrc(lags, statistic)))
+    statistic, status = constant_correlation(_two_dimensional(z), lags)
+    return Test(statistic, lags + 1, float(chdtrc(lags + 1, statistic)), float(chdtrc(lags, statistic)), status)

@@ -16,6 +16,7 @@ from vgyro.engine.models import (
     DCC_STATUSES,
     FAILED,
     GARCH_STATUSES,
+    NO_VARIANCE,
     NOT_POSITIVE_DEFINITE,
     ONE_GYRO,
     OUTLIER_DOMINATED,
@@ -31,6 +32,10 @@ STARTS = (
     (0.01, 0.98), (0.003, 0.995), (0.02, 0.95), (0.05, 0.9), (0.1, 0.8), (0.05, 0.7), (0.15, 0.5), (0.05, 0.4),
     (0.1, 0.1), (0.3, 0.1), (0.02, 0.6), (0.02, 0.02),
 )  # fmt: skip
+NOISE, BIAS = [0.0418, 0.0436, 0.0545, 0.06, 0.0484, 0.0446], [0.0086, -0.0092, 0.011, 0.1, 0.0082, 0.0066]
+"""deg/s, of six gyros at one sample a second."""
+GRID_A = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 8e-2, 0.2)
+GRID_B = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.955, 0.97, 0.98, 0.988, 0.993, 0.997)
 FIELDS = (
     "a", "b", "stderr", "stderr_hessian", "target", "log_likelihood", "log_likelihood_ccc", "statistic", "status",
 )  # fmt: skip
@@ -124,8 +129,8 @@ def test_standard_errors_are_those_of_pymgarch(n, samples):
     np.testing.assert_allclose(found.statistic, expected.statistic, rtol=1e-9)
 
 
-def dense_search(z):
-    """The greatest L_c over the triangle that SLSQP finds from twelve starts."""
+def dense_search(z, starts=STARTS):
+    """The greatest L_c over the triangle that SLSQP finds from its starts (a, b)."""
     target = recursions.correlation_target(z)
 
     def cost(x):
@@ -139,7 +144,7 @@ def dense_search(z):
     best = recursions.dcc_log_likelihood(z, 0.0, 0.0, target).sum()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for start in STARTS:
+        for start in starts:
             x = minimize(
                 cost, start, jac=True, method="SLSQP", bounds=[(0, PERSISTENCE_MAX)] * 2, constraints=[room],
                 options={"maxiter": 200, "ftol": 1e-10},
@@ -180,6 +185,68 @@ def shortfall(r):
         below = (best - found.log_likelihood[k]) / len(window)
         missed.append(0.0 if best - found.log_likelihood_ccc[k] < GAIN * len(window) else below)
     return missed
+
+
+def white_window(rng, kind, gyros=6, samples=360):
+    """Standardised residuals [T, N] of white noise: of its level with biases, demeaned, differenced, or as it is."""
+    if kind == "plain":
+        return rng.standard_normal((samples, gyros))
+    y = rng.normal(size=(samples + 1, 6)) * NOISE + BIAS
+    r = {"level": y[1:], "demeaned": y[1:] - y[1:].mean(axis=0), "difference": np.diff(y, axis=0)}[kind]
+    return by_own_margins(r)
+
+
+def by_own_margins(r):
+    fit = garch.fit_garch_windows(r[None])
+    return standardised(r, fit.omega[0], fit.alpha[0], fit.beta[0])
+
+
+def local_maxima(z):
+    """(a, b) of the local maxima of L_c on a dense grid, and L_c of a constant correlation."""
+    target = recursions.correlation_target(z)
+
+    def likelihood(a, b):
+        return recursions.dcc_log_likelihood(z, a, b, target).sum() if a + b < 1 else -np.inf
+
+    grid = np.array([[likelihood(a, b) for a in GRID_A] for b in GRID_B])
+    wide = np.pad(grid, 1, constant_values=-np.inf)
+    around = [wide[1 + i : 1 + i + len(GRID_B), 1 + j : 1 + j + len(GRID_A)] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    places = np.nonzero((grid >= np.max(around, axis=0)) & np.isfinite(grid))
+    return [(GRID_A[column], GRID_B[row]) for row, column in zip(*places, strict=True)], likelihood(0.0, 0.0)
+
+
+def test_a_small_maximum_next_to_no_dynamics():
+    # Expected: L_c 34.0028 with a = 0, and 34.0120 at (.0017, .376), by a dense search.
+    y = np.round(np.random.default_rng(4).normal(size=(3600, 6)) * NOISE + BIAS, 6)
+    z = by_own_margins(y[3240:])
+    for engine in (dcc, reference):
+        found = engine.fit_dcc(z)
+        assert found.log_likelihood_ccc == pytest.approx(34.0028, abs=5e-5)
+        assert found.log_likelihood == pytest.approx(34.0120, abs=5e-5)
+        assert (found.a, found.b) == (pytest.approx(0.0017, abs=1e-4), pytest.approx(0.376, abs=2e-3))
+
+
+@pytest.mark.parametrize("kind", ["level", "demeaned", "plain"])
+def test_no_small_maximum_of_white_noise_is_missed(kind):
+    # Expected: none of 80 fits of each kind is worse than SciPy's from all local maxima of a dense grid.
+    rng = np.random.default_rng([2028, len(kind)])
+    for number in range(80):
+        z = white_window(rng, kind, gyros=2 + number % 5)
+        starts, constant = local_maxima(z)
+        best = dense_search(z, starts)
+        below = best - dcc.fit_dcc(z).log_likelihood
+        assert below < GAIN * len(z) or best - constant < GAIN * len(z), number
+
+
+def test_the_engines_agree_on_white_noise():
+    # Expected: either is no worse than the other by more than the cross-check allows, 1e-5 a sample.
+    rng = np.random.default_rng(606)
+    for kind in ("level", "demeaned", "difference", "plain"):
+        for _ in range(6):
+            z = white_window(rng, kind)
+            assert dcc.fit_dcc(z).log_likelihood == pytest.approx(
+                reference.fit_dcc(z).log_likelihood, abs=1e-5 * len(z)
+            )
 
 
 @pytest.mark.parametrize("n", [2, 3, 6])
@@ -237,20 +304,25 @@ def test_units_do_not_matter(windows):
 
 def test_statuses(windows):
     # Expected: the rules of vgyro.engine.status; by definition a = b = 0 where S is singular or data are not finite.
-    r, omega, alpha, beta, status = (part[:5].copy() for part in windows)
+    r, omega, alpha, beta, status = (part[:7].copy() for part in windows)
     r[0, :, 3] = r[0, :, 2]
     r[1, 7, 0] = np.nan
     r[2, 7, 0] = np.inf
     status[3, 1] = GARCH_STATUSES.index("boundary: β = 0")
     status[4, 1] = GARCH_STATUSES.index(OUTLIER_DOMINATED)
+    r[5, :, 5] = 0.0
+    r[6, :, 0] = 0.7
     found = dcc.fit_dcc_windows(r, omega, alpha, beta, status)
-    assert named(found) == [NOT_POSITIVE_DEFINITE, FAILED, FAILED, BOUNDARY_MARGIN, OUTLIER_DOMINATED]
-    np.testing.assert_array_equal(found.a[:3], 0.0)
-    np.testing.assert_array_equal(found.target[:3], np.tile(np.eye(6), (3, 1, 1)))
-    np.testing.assert_array_equal(np.isfinite(found.log_likelihood), [True, False, False, True, True])
+    names = [NOT_POSITIVE_DEFINITE, FAILED, FAILED, BOUNDARY_MARGIN, OUTLIER_DOMINATED, NO_VARIANCE, NO_VARIANCE]
+    assert named(found) == names
+    assert named(reference.fit_dcc_windows(r, omega, alpha, beta, status)) == names
+    fitted = np.array([False, False, False, True, True, False, False])
+    np.testing.assert_array_equal(found.a[~fitted], 0.0)
+    np.testing.assert_array_equal(found.target[~fitted], np.tile(np.eye(6), (5, 1, 1)))
+    np.testing.assert_array_equal(np.isfinite(found.log_likelihood), [True, False, False, True, True, False, False])
     assert np.isnan(found.stderr).all()
-    np.testing.assert_array_equal(np.isfinite(found.stderr_hessian[:, 0]), [False, False, False, True, False])
-    same(dcc.fit_dcc_windows(*(part[3:] for part in (r, omega, alpha, beta, status))), found, slice(3, 5))
+    np.testing.assert_array_equal(np.isfinite(found.stderr_hessian[:, 0]), np.arange(7) == 3)
+    same(dcc.fit_dcc_windows(*(part[3:] for part in (r, omega, alpha, beta, status))), found, slice(3, 7))
 
 
 def test_no_dynamics():

@@ -20,6 +20,8 @@ cdef extern from "dcc.h" nogil:
         double persistence_max
         double eigenvalue_min
         double gain
+        double flat
+        double pivot_min
         int lags
 
     int vg_dcc_fit(const dcc_windows *, const dcc_rules *, double *, double *, uint8_t *, ptrdiff_t, ptrdiff_t)

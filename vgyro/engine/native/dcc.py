@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from vgyro.engine.constant import constant_fit, fit_ccc
+from vgyro.engine.constant import constant_fit, fit_ccc, without_variance
 from vgyro.engine.models import (
     BOUNDARY_MARGIN,
     CONVERGED,
     DCC_STATUSES,
     EIGENVALUE_MIN,
     FAILED,
+    NO_VARIANCE,
     NOT_POSITIVE_DEFINITE,
     ONE_GYRO,
     PERSISTENCE_MAX,
@@ -21,14 +22,16 @@ from vgyro.engine.models import (
 )
 from vgyro.engine.native import _dcc, pool
 from vgyro.engine.recursions import dcc_correlation
-from vgyro.engine.status import GAIN, MIN_SAMPLES, dcc_code, dcc_status_codes, garch_code
+from vgyro.engine.status import FLAT, GAIN, MIN_SAMPLES, PIVOT_MIN, dcc_code, dcc_status_codes, garch_code
 from vgyro.errors import EngineError
 
 __all__ = ["fit_ccc", "fit_dcc", "fit_dcc_windows"]
 
 PIECE = 64
 """Windows a thread takes at a time."""
-STATES = np.array([dcc_code(status) for status in (CONVERGED, FAILED, NOT_POSITIVE_DEFINITE)], dtype=np.uint8)
+STATES = np.array(
+    [dcc_code(status) for status in (CONVERGED, FAILED, NOT_POSITIVE_DEFINITE, NO_VARIANCE)], dtype=np.uint8
+)
 """Status of a window by its state in c/dcc.h."""
 
 
@@ -57,6 +60,8 @@ def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None
     known = np.full((1, n), garch_code(CONVERGED), dtype=np.uint8)
     found = _fit(z[None], None, known, 1)
     status = DCC_STATUSES[found.status[0]]
+    if status == NO_VARIANCE and not without_variance(z, r):
+        status = FAILED
     a, b, target = float(found.a[0]), float(found.b[0]), found.target[0]
     if a == 0:
         return constant_fit(z, target, status)
@@ -94,11 +99,15 @@ def _fit(series: np.ndarray, margins: np.ndarray | None, margin_codes: np.ndarra
         codes = state
     else:
         windows = _dcc.Windows(series, margins)
-        rules = {"persistence_max": PERSISTENCE_MAX, "eigenvalue_min": EIGENVALUE_MIN, "gain": GAIN, "lags": lags}
+        rules = {
+            "persistence_max": PERSISTENCE_MAX, "eigenvalue_min": EIGENVALUE_MIN, "gain": GAIN, "flat": FLAT,
+            "pivot_min": PIVOT_MIN, "lags": lags,
+        }  # fmt: skip
         pool.run(lambda start, stop: windows.fit(rules, values, target, state, start, stop), count, PIECE)
         codes = np.where(state == 0, dcc_status_codes(values[:, 0], values[:, 1], margin_codes), STATES[state])
     a, b, likelihood, constant, statistic = np.ascontiguousarray(values.T)
-    likelihood[codes == dcc_code(FAILED)] = constant[codes == dcc_code(FAILED)] = np.nan
+    unknown = np.isin(codes, [dcc_code(FAILED), dcc_code(NO_VARIANCE)])
+    likelihood[unknown] = constant[unknown] = np.nan
     hessian, robust = _errors(series, margins, a, b, codes)
     return DccWindows(a, b, robust, hessian, target, likelihood, constant, statistic, codes)
 

@@ -16,7 +16,7 @@ from vgyro.engine.constant import (
     constant_correlation_statistic,
     constant_fit,
     fit_ccc,
-    singular,
+    unusable,
 )
 from vgyro.engine.models import (
     BOUNDARY_MARGIN,
@@ -24,10 +24,7 @@ from vgyro.engine.models import (
     DCC_STATUSES,
     FAILED,
     GARCH_STATUSES,
-    NOT_POSITIVE_DEFINITE,
-    ONE_GYRO,
     PERSISTENCE_MAX,
-    TOO_SHORT,
     DccFit,
     DccWindows,
     GarchFit,
@@ -44,6 +41,8 @@ from vgyro.engine.status import GAIN, MIN_SAMPLES, dcc_code, dcc_status_codes, g
 __all__ = ["fit_by_pymgarch", "fit_ccc", "fit_dcc", "fit_dcc_windows"]
 
 STARTS = ((0.02, 0.95), (0.05, 0.90), (0.10, 0.80), (0.15, 0.40), (0.10, 0.05))
+RIM = (0.0, 0.12, 0.24, 0.36, 0.48, 0.6, 0.7, 0.78, 0.84, 0.88, 0.91, 0.935, 0.955, 0.97, 0.98, 0.988, 0.994, 0.998)
+"""Values of b at which the slope of L_c at a = 0 is looked at."""
 INFEASIBLE = 1e10
 HESSIAN_STEP = 1e-4
 
@@ -84,16 +83,11 @@ def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None
     """Fit DCC(1,1) to z [T, N]. See vgyro.volatility.fit_dcc for the conventions."""
     # Contiguous: the rounding of a sum depends on the stride.
     z = np.ascontiguousarray(z, dtype=float)
-    samples, n = z.shape
-    if n < 2:
-        return constant_fit(z, np.eye(n), ONE_GYRO)
-    if samples < max(MIN_SAMPLES, n + 2):
-        return constant_fit(z, np.eye(n), TOO_SHORT)
-    if not np.all(np.isfinite(z)):
-        return constant_fit(z, np.eye(n), FAILED)
+    n = z.shape[1]
+    reason = unusable(z, max(MIN_SAMPLES, n + 2), r)
+    if reason:
+        return constant_fit(z, np.eye(n), reason)
     target = correlation_target(z)
-    if singular(target):
-        return constant_fit(z, np.eye(n), NOT_POSITIVE_DEFINITE)
     names = np.full(n, CONVERGED) if margins is None else margins.status
     codes = np.array([[garch_code(name) for name in names]])
     a, b, ended_well = _maximise(z, target)
@@ -137,7 +131,7 @@ def _maximise(z: np.ndarray, target: np.ndarray) -> tuple[float, float, bool]:
     constant = -float(dcc_log_likelihood(z, 0.0, 0.0, target).sum())
     best, best_cost = (0.0, 0.0), constant
     ended_well = False
-    for start in STARTS:
+    for start in (*STARTS, *_starts_at_rim(z, target)):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             result = minimize(
@@ -157,6 +151,29 @@ def _maximise(z: np.ndarray, target: np.ndarray) -> tuple[float, float, bool]:
     if constant - best_cost < GAIN * len(z):
         return 0.0, 0.0, ended_well
     return best[0], min(best[1], PERSISTENCE_MAX - best[0]), ended_well
+
+
+def _starts_at_rim(z: np.ndarray, target: np.ndarray) -> list[tuple[float, float]]:
+    """(a, b) of small maxima next to a = 0, where no start of a fixed size finds them.
+
+    With Q_t = S the slope of a sample's likelihood in a is ⟨w_t, A_t⟩, w_t = ½(u u' - S⁻¹ - diag(uz - 1)), u = S⁻¹z,
+    and A the mean of zz' - S over the past, with memory b. With the sum of its squares as the information, L_c rises
+    by (Σ slope)²/(2·Σ slope²) at most: a start at each maximum of that over b.
+    """
+    from scipy.signal import lfilter
+
+    inverse = np.linalg.inv(target)
+    u = z @ inverse
+    weight = 0.5 * (u[:, :, None] * u[:, None, :] - inverse)
+    index = np.arange(len(target))
+    weight[:, index, index] -= 0.5 * (u * z - 1)
+    past = z[:, :, None] * z[:, None, :] - target
+    slopes = [np.sum(weight * lfilter([0.0, 1.0], [1.0, -b], past, axis=0), axis=(1, 2)) for b in RIM]
+    rise, square = (np.array([np.sum(one**power) for one in slopes]) for power in (1, 2))
+    promise = np.divide(rise**2, 2 * square, out=np.zeros(len(RIM)), where=rise > 0)
+    padded = np.concatenate([[-np.inf], promise, [-np.inf]])
+    peaks = (promise > padded[:-2]) & (promise >= padded[2:]) & (promise > 0)
+    return [(min(rise[k] / square[k], (1 - RIM[k]) / 2), RIM[k]) for k in np.flatnonzero(peaks)]
 
 
 def _hessian_stderr(z: np.ndarray, a: float, b: float, target: np.ndarray) -> np.ndarray:

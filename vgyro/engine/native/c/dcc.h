@@ -11,8 +11,10 @@
 /* The way back in time goes by blocks of samples; of each sample W, Q and z - √q u are kept (dcc_adjoint.h). */
 #define DCC_BLOCK 64
 #define DCC_KEPT(n) (2 * DCC_TRI(n) + (n))
+/* Places b at which the slope at a = 0 is known (dcc_slope.h); a multiple of VG_LANES. */
+#define DCC_SLOPES 20
 
-enum { DCC_FITTED = 0, DCC_NOT_FINITE = 1, DCC_SINGULAR = 2 };
+enum { DCC_FITTED = 0, DCC_NOT_FINITE = 1, DCC_SINGULAR = 2, DCC_CONSTANT = 3 };
 enum { DCC_A = 0, DCC_B, DCC_LIKELIHOOD, DCC_LIKELIHOOD_CCC, DCC_STATISTIC, DCC_VALUES };
 
 /* Windows of one shape: series [K, samples, n], and omega, alpha, beta [K, n] of their margins.
@@ -24,7 +26,7 @@ typedef struct {
 } dcc_windows;
 
 typedef struct {
-    double persistence_max, eigenvalue_min, gain;
+    double persistence_max, eigenvalue_min, gain, flat, pivot_min;
     int lags;
 } dcc_rules;
 

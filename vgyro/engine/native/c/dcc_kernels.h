@@ -46,6 +46,7 @@ VG_INLINE double VG(dcc_close)(const dcc_likelihood *l, const dcc_window *w) {
 #include "dcc_step.h"
 #include "dcc_score.h"
 #include "dcc_adjoint.h"
+#include "dcc_slope.h"
 #undef DCC
 #undef DCC_DIM
 #undef DCC_N
@@ -58,6 +59,7 @@ VG_INLINE double VG(dcc_close)(const dcc_likelihood *l, const dcc_window *w) {
 #include "dcc_step.h"
 #include "dcc_score.h"
 #include "dcc_adjoint.h"
+#include "dcc_slope.h"
 #undef DCC
 #undef DCC_DIM
 #undef DCC_N
@@ -73,6 +75,11 @@ VG_INLINE double VG(dcc_score)(const dcc_window *w, double a, double b, double *
 
 VG_INLINE void VG(dcc_adjoint)(const dcc_memory *m, v4 a, v4 b, const double *beta, v4 *slope, v4 *cross) {
     (m->window.n == 6 ? VG(dcc6_adjoint) : VG(dccn_adjoint))(m, a, b, beta, slope, cross);
+}
+
+VG_INLINE void VG(dcc_slopes)(const dcc_window *w, const double *inverse, const double *b, double *rise,
+                              double *square) {
+    (w->n == 6 ? VG(dcc6_slopes) : VG(dccn_slopes))(w, inverse, b, rise, square);
 }
 
 #include "dcc_margins.h"

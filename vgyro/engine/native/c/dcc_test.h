@@ -42,7 +42,7 @@ VG_INLINE double VG(dcc_whitener)(const dcc_window *w, double *root) {
         for (int j = 0; j < n; j++) matrix[i * n + j] = w->target[DCC_AT(i, j)];
     VG(dcc_eigen)(n, matrix, values, vectors);
     for (int k = 0; k < n; k++)
-        if (!(values[k] >= smallest)) smallest = values[k];
+        if (!(values[k] >= smallest) && !isnan(smallest)) smallest = values[k];
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
             root[i * n + j] = 0;
@@ -60,7 +60,7 @@ VG_INLINE void VG(dcc_pairs)(int n, const double *root, const double *z, double 
         for (int j = 0; j < i; j++) *pairs++ = white[i] * white[j];
 }
 
-/* Solve matrix [n, n] x = right, positive definite; both are overwritten, right by x. */
+/* Solve matrix [n, n] x = right, positive definite; both are overwritten, right by x, the diagonal by the pivots. */
 VG_INLINE void VG(dcc_solve)(ptrdiff_t n, double *matrix, double *right) {
     for (ptrdiff_t j = 0; j < n; j++)
         for (ptrdiff_t i = j + 1; i < n; i++) {
@@ -75,10 +75,10 @@ VG_INLINE void VG(dcc_solve)(ptrdiff_t n, double *matrix, double *right) {
 }
 
 /* The statistic: the pairs, stacked, on a constant and `lags` lags of their own; δ'X'Xδ / σ̂² = δ'X'y / σ̂².
-   NaN where the samples are too few. ring holds the pairs of the last lags + 1 samples, sums their products. */
-VG_NOINLINE double VG(dcc_statistic)(const dcc_memory *m, const double *root, int lags) {
+   NaN where the samples are too few, a regressor depends on the others, or nothing is left over. ring holds the pairs of the last lags + 1 samples, sums their products. */
+VG_NOINLINE double VG(dcc_statistic)(const dcc_memory *m, const double *root, const dcc_rules *rules) {
     const dcc_window *w = &m->window;
-    const int n = w->n, pairs = n * (n - 1) / 2, chunks = (pairs + 3) / 4, size = lags + 1;
+    const int lags = rules->lags, n = w->n, pairs = n * (n - 1) / 2, chunks = (pairs + 3) / 4, size = lags + 1;
     if (w->samples < lags + 3) return NAN;
     const double count = (double)(w->samples - lags) * pairs;
     v4 *total = m->sums, *product = m->sums + size;
@@ -105,6 +105,11 @@ VG_NOINLINE double VG(dcc_statistic)(const dcc_memory *m, const double *root, in
     }
     VG(dcc_solve)(size, matrix, delta);
     double explained = 0;
-    for (int i = 0; i < size; i++) explained += delta[i] * right[i];
-    return explained / ((VG(dcc_sum)(product[0]) - explained) / count);
+    for (int i = 0; i < size; i++) {
+        const double whole = i ? VG(dcc_sum)(product[i * size + i]) : count;
+        if (!(matrix[i * size + i] > rules->pivot_min * whole)) return NAN;
+        explained += delta[i] * right[i];
+    }
+    const double all = VG(dcc_sum)(product[0]), rest = all - explained;
+    return rest > rules->pivot_min * all ? explained / (rest / count) : NAN;
 }
