@@ -7,10 +7,17 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import ArrayNoise, ArrayRates
+from vgyro.fusion.array import AllanScales
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 ARW = 6.17 / 60.0
+RRW = 0.001
+
+
+def pattern(arw, tau):
+    """Allan variance [J, N, N] of white noise and random walks in all gyros, one with the other."""
+    return (np.outer(arw, arw)[None] / tau[:, None, None]) + RRW**2 * tau[:, None, None] / 3
 
 
 @pytest.fixture
@@ -26,7 +33,9 @@ def make_array():
         white = rng.standard_normal((samples, len(arw))) @ np.linalg.cholesky(correlation).T
         rate = np.asarray(truth)[..., None] + white * arw * np.sqrt(rate_hz)
         segment = np.zeros(samples, dtype=np.int32) if segment is None else segment
-        noise = ArrayNoise(arw, np.full(len(arw), 0.001), correlation)
+        tau = 2.0 ** np.arange(20) / rate_hz
+        scales = AllanScales(tau, correlation * pattern(arw, tau), 2.0**20 / 2.0 ** np.arange(20))
+        noise = ArrayNoise(arw, np.full(len(arw), RRW), correlation, scales=scales)
         return ArrayRates(rate, rate_hz, segment, np.full(samples, at_rest), noise, weights or {})
 
     return make

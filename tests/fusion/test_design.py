@@ -113,3 +113,31 @@ def test_useless_covariance(wrong):
 def test_bandwidth_below_the_markov_rate():
     with pytest.raises(DataError, match="bandwidth"):
         design.q_for_bandwidth(D, 0.1, tau=0.5)
+
+
+def test_what_makes_a_covariance_singular_is_named():
+    R = np.eye(5) * ARW**2
+    assert design.flaw(R) == ""
+    copies = R.copy()
+    copies[1, 3] = copies[3, 1] = ARW**2
+    with pytest.raises(DataError, match=r"positive definite: gyros 2 and 4 are copies of each other"):
+        design.information(copies)
+    unknown = R.copy()
+    unknown[2], unknown[:, 2], unknown[4, 4] = np.nan, np.nan, 0.0
+    with pytest.raises(DataError, match="the noise of gyros 3, 5 is not known, or zero"):
+        design.gain_direction(unknown)
+    # g5 = (g1 + g2)/√2, but for a millionth of its noise that is its own.
+    dependent = R.copy()
+    dependent[4, :2] = dependent[:2, 4] = ARW**2 / math.sqrt(2)
+    with pytest.raises(DataError, match="a combination of gyros 1, 2, 5 has no noise"):
+        design.information(dependent)
+    dependent[4, 4] *= 1 + 1e-6
+    assert design.flaw(dependent) == ""
+    dependent[4, 4] *= 0.9
+    assert design.flaw(dependent) == "a combination of gyros 1, 2, 5 has a negative variance"
+
+
+def test_scales_far_apart_are_no_flaw():
+    variance = np.array([1e-12, 1.0, 1e12])
+    assert design.flaw(np.diag(variance)) == ""
+    assert design.information(np.diag(variance)) == pytest.approx((1 / variance).sum())

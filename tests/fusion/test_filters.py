@@ -216,8 +216,11 @@ def test_one_arw_for_all_gyros(make_array):
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_reason_when_the_noise_is_not_known(make_array, name):
+def test_a_gyro_whose_noise_is_not_known_is_left_out(make_array, name):
     array = make_array(10, UNEQUAL)
-    array = replace(array, noise=replace(array.noise, arw=np.array([0.1, np.nan, 0.1, 0.1])))
+    partly, nothing = (np.array(arw) for arw in ([0.1, np.nan, 0.1, 0.1], [np.nan] * 4))
+    fused = METHODS[name].fuse(replace(array, noise=replace(array.noise, arw=partly)), STATIC)
+    np.testing.assert_allclose(fused.weights, np.array([1, 0, 1, 1]) / 3)
+    assert fused.note.startswith("gyro 2 is left out: it has no measured angle random walk; ")
     with pytest.raises(CannotRun, match="noise covariance"):
-        METHODS[name].fuse(array, STATIC)
+        METHODS[name].fuse(replace(array, noise=replace(array.noise, arw=nothing)), STATIC)

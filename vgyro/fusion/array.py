@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal, TypeVar
@@ -66,6 +66,15 @@ class ArrayNoise:
     def R(self) -> np.ndarray:
         """Continuous noise covariance [N, N], (deg/s)²/Hz: arw_i · arw_j · correlation_ij."""
         return np.outer(self.arw, self.arw) * self.correlation
+
+    def of(self, gyros: Sequence[int]) -> ArrayNoise:
+        """The noise of some gyros, by their places."""
+        rows, columns = np.ix_(np.asarray(gyros), np.asarray(gyros))
+        scales = self.scales
+        if scales is not None:
+            scales = replace(scales, covariance=scales.covariance[:, rows, columns])
+        correlation = self.correlation[rows, columns]
+        return replace(self, arw=self.arw[columns[0]], rrw=self.rrw[columns[0]], correlation=correlation, scales=scales)
 
     def with_arw(self, arw: float | None) -> ArrayNoise:
         """The same array with one ARW for every gyro, deg/s/√Hz; None changes nothing."""

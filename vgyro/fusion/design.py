@@ -13,6 +13,11 @@ import numpy as np
 
 from vgyro.errors import DataError
 
+SINGULAR = 1e-10
+"""A combination of gyros whose variance is a smaller share of their own has none: rounding of sums over a recording
+leaves some 1e-14, and gyros that are not copies differ by more than 1e-5 of their noise."""
+INVOLVED = 0.1
+
 
 def information(R: np.ndarray) -> float:
     """D = 1'R⁻¹1, Hz/(deg/s)²: what one second of the whole array says about the rate. Jiang et al. (2012), eq. 10.
@@ -30,17 +35,45 @@ def gain_direction(R: np.ndarray) -> np.ndarray:
 
 
 def _solved(R: np.ndarray) -> np.ndarray:
+    """R⁻¹1.  raises : DataError, which names the gyros that make R no covariance to be inverted"""
     R = np.asarray(R, dtype=float)
-    try:
-        if not np.isfinite(R).all():
-            raise np.linalg.LinAlgError
-        np.linalg.cholesky(R)
-    except np.linalg.LinAlgError:
+    why = flaw(R)
+    if why:
         raise DataError(
-            "the noise covariance R is not finite and positive definite",
+            f"the noise covariance R is not finite and positive definite: {why}",
             remedy="look for gyros that are copies of each other or whose angle random walk was not measured",
-        ) from None
+        )
     return np.linalg.solve(R, np.ones(len(R)))
+
+
+def flaw(covariance: np.ndarray) -> str:
+    """Why a covariance [N, N] cannot be inverted, with the gyros counted from 1; empty if it can.
+
+    Gyros whose noise adds up to nothing in some combination (a share below SINGULAR of their own variances) are named;
+    two of them with the correlation 1 are copies.
+    """
+    variance = np.diag(covariance)
+    bad = ~(np.isfinite(variance) & (variance > 0))
+    if not bad.any():
+        bad = ~np.isfinite(covariance).all(axis=1)
+    if bad.any():
+        return f"the noise of {_gyros(np.flatnonzero(bad))} is not known, or zero"
+    scale = np.sqrt(variance)
+    correlation = covariance / np.outer(scale, scale)
+    copies = np.argwhere(np.triu(correlation, 1) > 1.0 - SINGULAR)
+    if len(copies):
+        pairs = ", ".join(f"{first + 1} and {second + 1}" for first, second in copies.tolist())
+        return f"gyros {pairs} are copies of each other"
+    value, vector = np.linalg.eigh(correlation)
+    if value[0] > SINGULAR:
+        return ""
+    involved = np.flatnonzero(np.abs(vector[:, 0]) > INVOLVED * np.abs(vector[:, 0]).max())
+    what = "no noise" if value[0] > -SINGULAR else "a negative variance"
+    return f"a combination of {_gyros(involved)} has {what}"
+
+
+def _gyros(places: np.ndarray) -> str:
+    return f"gyro{'s' if len(places) > 1 else ''} {', '.join(str(place + 1) for place in places.tolist())}"
 
 
 def pole(D: float, q: float, tau: float = math.inf) -> float:

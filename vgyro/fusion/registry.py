@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from vgyro.errors import ConfigError
+from vgyro.errors import ConfigError, VgyroError
 from vgyro.fusion import (
     al_majed,
     bayard_ploen,
@@ -19,13 +21,17 @@ from vgyro.fusion import (
     moments,
     parity_rows,
     recommended,
+    scale_wise,
     slow_rows,
     smoothed,
     stubberud,
+    vaccaro_zaki,
     waegli_guerrier,
 )
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused, Method
 from vgyro.fusion.conditional import SAME_AT_ANY_RATE, conditional
+from vgyro.fusion.packages import methods_of_packages
+from vgyro.fusion.unusable import on_usable
 from vgyro.validation import did_you_mean
 
 LIU = "Liu et al. (2015), eq. 15-17"
@@ -77,21 +83,21 @@ _BASELINES = (
 )
 _PAPERS = (
     Method("bayard_ploen", "Bayard & Ploen 2003, parity form", bayard_ploen.SOURCE, True, ("arw", "rrw", "correlation"),
-           bayard_ploen.bayard_ploen, same_at_any_rate=bayard_ploen.SAME_AT_ANY_RATE,
+           on_usable(bayard_ploen.bayard_ploen), same_at_any_rate=bayard_ploen.SAME_AT_ANY_RATE,
            operations=bayard_ploen.operations, inferred=bayard_ploen.INFERRED),
     Method("chang_2008", "Chang 2008, level 1", chang_2008.SOURCE, True, ("arw", "rrw", "correlation"),
-           chang_2008.chang_2008, operations=chang_2008.operations, inferred=chang_2008.INFERRED),
+           on_usable(chang_2008.chang_2008), operations=chang_2008.operations, inferred=chang_2008.INFERRED),
     Method("stubberud_2008", "Stubberud 2008, EKF of scale and bias", STUBBERUD, True, ("arw", "rrw"),
-           stubberud.stubberud_2008, operations=stubberud.operations, inferred=stubberud.INFERRED),
-    Method("al_majed", "Al-Majed 2009, adaptive bank", AL_MAJED, True, ("arw",), al_majed.al_majed,
+           on_usable(stubberud.stubberud_2008), operations=stubberud.operations, inferred=stubberud.INFERRED),
+    Method("al_majed", "Al-Majed 2009, adaptive bank", AL_MAJED, True, ("arw",), on_usable(al_majed.al_majed),
            same_at_any_rate=_BANK, operations=al_majed.operations, inferred=al_majed.INFERRED),
-    Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), filters.jiang_markov,
+    Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), on_usable(filters.jiang_markov),
            operations=costs.low_passed),
     Method("jiang_random_walk", "Jiang 2012, random walk", f"{JIANG}, 1/τ → 0", True, ("arw",),
-           filters.jiang_random_walk, same_at_any_rate=_UNIT_GAIN, operations=costs.low_passed),
-    Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), filters.xue_2012,
+           on_usable(filters.jiang_random_walk), same_at_any_rate=_UNIT_GAIN, operations=costs.low_passed),
+    Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), on_usable(filters.xue_2012),
            same_at_any_rate=_UNIT_GAIN, operations=costs.settling, inferred="P0 = 1/(D·T)"),
-    Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), filters.chang_2012,
+    Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), on_usable(filters.chang_2012),
            same_at_any_rate=_UNIT_GAIN, operations=costs.low_passed),
     _conditional("ccc", "in_sample", f"{LIU}, a = b = 0"),
     _conditional("ccc", "causal", f"{LIU}, a = b = 0, carried forward"),
@@ -100,6 +106,15 @@ _PAPERS = (
     Method("waegli_guerrier", "Waegli/Guerrier, ARMA-GARCH of the residual", waegli_guerrier.SOURCE, False, (),
            waegli_guerrier.waegli_guerrier, same_at_any_rate=waegli_guerrier.SAME_AT_ANY_RATE,
            operations=waegli_guerrier.operations, inferred=waegli_guerrier.INFERRED),
+    Method("vaccaro_zaki", "Vaccaro & Zaki 2017, least drift", vaccaro_zaki.SOURCE, True, ("scales",),
+           on_usable(vaccaro_zaki.vaccaro_zaki, needs_arw=False), same_at_any_rate=_FIXED,
+           operations=costs.weighted, inferred=vaccaro_zaki.INFERRED),
+    Method("scale_wise_all", "Zhang 2022, all scales alike", scale_wise.SOURCE, True, ("scales",),
+           on_usable(scale_wise.scale_wise_all, needs_arw=False), same_at_any_rate=_FIXED,
+           operations=costs.weighted, inferred=scale_wise.INFERRED_ALL),
+    Method("scale_wise_large", "Zhang 2022, large scales", scale_wise.SOURCE, True, ("scales",),
+           on_usable(scale_wise.scale_wise_large, needs_arw=False), same_at_any_rate=_FIXED,
+           operations=costs.weighted, inferred=scale_wise.INFERRED_LARGE),
 )
 _OURS = (
     Method("parity_weights", "Parity variances", OWN, False, (), parity_rows.parity_weights,
@@ -124,12 +139,20 @@ _ALL = (*_BASELINES, *_PAPERS, *_OURS)
 
 METHODS: dict[str, Method] = {method.name: method for method in _ALL}
 
+LEFT_OUT: list[str] = []
+"""What other packages bring and cannot be used, and why: a line each."""
+
+
+State = Literal["ran", "cannot run", "failed"]
+LONGEST_REASON = 300
+
 
 @dataclass(frozen=True)
 class Outcome:
     """One method, for one definition of r_t where it has them: what came out, or why nothing did.
 
     column : name of its column, dcc_causal[level]; empty where it could not run
+    failed : it ended with an error, and did not find by itself that it cannot run
     """
 
     method: Method
@@ -137,6 +160,12 @@ class Outcome:
     column: str
     fused: Fused | None
     note: str
+    failed: bool = False
+
+    @property
+    def state(self) -> State:
+        """What became of it."""
+        return "ran" if self.fused is not None else "failed" if self.failed else "cannot run"
 
 
 def select(names: Sequence[str] | Literal["all"]) -> list[Method]:
@@ -158,7 +187,8 @@ def run_methods(
 ) -> Iterator[Outcome]:
     """Run `methods`, those with weights once for each definition of r_t, one after the other.
 
-    A method that cannot run, or whose rate is not finite, gives an Outcome without a rate and with the reason.
+    A method that cannot run, fails, or whose rate is not finite gives an Outcome without a rate and with the reason;
+    the others go on. Why it failed is in the log, with the traceback. A method cannot write into the rates.
     An array of one gyro has nothing to fuse: no method runs.
     moved : a constant rate was added; only what may answer to that is run
     """
@@ -190,11 +220,62 @@ def _not_finite(finite: np.ndarray) -> str:
 def _run(array: ArrayRates, parameters: FilterParameters, method: Method) -> Outcome:
     definition = parameters.definition
     try:
-        fused = method.fuse(array, parameters)
+        with _read_only(array.rate):
+            fused = _checked(method.fuse(array, parameters), len(array.rate))
     except CannotRun as reason:
         return Outcome(method, definition, "", None, str(reason))
+    except (Exception, SystemExit) as error:
+        # A bug, of ours or of another package, or data nobody thought of: that ends this method, never the job.
+        logging.exception("%s failed", method.name)
+        return Outcome(method, definition, "", None, failure(method, error), failed=True)
     broken = _not_finite(np.isfinite(fused.rate))
     if broken:
-        return Outcome(method, definition, "", None, broken)
+        logging.error("%s failed: %s", method.name, broken)
+        return Outcome(method, definition, "", None, f"failed: of its rate {broken}", failed=True)
     column = f"{method.name}[{definition}]" if definition else method.name
     return Outcome(method, definition, column, fused, fused.note)
+
+
+def failure(method: Method, error: BaseException) -> str:
+    """That a method failed, and why, in one line. An error of another kind than VgyroError is a bug, and called so."""
+    reason = str(error).partition("\n")[0][:LONGEST_REASON].rstrip(". ")
+    if isinstance(error, VgyroError) and not method.package:
+        return f"failed: {reason}"
+    whose = f"package {method.package}" if method.package else "vgyro"
+    said = f"{type(error).__name__}: {reason}" if reason else type(error).__name__
+    return f"failed: {said} (a bug in {whose}; the traceback is in the log)"
+
+
+def _checked(fused: Fused, samples: int) -> Fused:
+    """What a method returned, if it is a rate [samples].  raises : TypeError, ValueError if not"""
+    if not isinstance(fused, Fused):
+        raise TypeError(f"it returned {type(fused).__name__}, not Fused")
+    for name, values in (("rate", fused.rate), ("sd", fused.sd)):
+        if values is None and name == "sd":
+            continue
+        if not isinstance(values, np.ndarray) or values.shape != (samples,) or values.dtype.kind != "f":
+            raise ValueError(f"its {name} is no array [{samples}] of real numbers")
+    return fused
+
+
+@contextmanager
+def _read_only(rate: np.ndarray) -> Iterator[None]:
+    """The methods share the rates: while one runs it cannot change them for the others."""
+    writeable = rate.flags.writeable
+    rate.flags.writeable = False
+    try:
+        yield
+    finally:
+        rate.flags.writeable = writeable
+
+
+def _join_packages() -> None:
+    """Methods of other packages, after our own; one line a package that cannot be used."""
+    found, problems = methods_of_packages(METHODS)
+    METHODS.update({method.name: method for method in found})
+    LEFT_OUT.extend(problems)
+    for problem in problems:
+        logging.getLogger(__name__).warning(problem)
+
+
+_join_packages()
