@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,8 +28,8 @@ from vgyro.fusion.faults import search_faults
 from vgyro.fusion.missing import fill_missing
 from vgyro.fusion.registry import run_methods, select
 from vgyro.metrics import Sampling
-from vgyro.tasks.fusion_inputs import in_motion
-from vgyro.tasks.noise import ArrayNoiseRecord, noise_at_rest, noise_in_motion, record_of
+from vgyro.tasks.fusion_inputs import in_motion, noise_of_record
+from vgyro.tasks.noise import noise_at_rest, noise_in_motion, record_of
 from vgyro.tasks.rates_file import ArrayFile, FileColumns
 
 Row = dict[str, Any]
@@ -62,18 +62,21 @@ def trial_arrays(trial: Trial) -> dict[str, PartArrays]:
     recordings = {"motion": trial.motion, **({"rest": trial.rest} if trial.rest is not None else {})}
     wanted = {part: one for part, one in recordings.items() if part in trial.scenario.score}
     noise = _noise(trial)
-    return {part: _arrays(one, noise) for part, one in wanted.items()}
+    return {part: _arrays(one, noise, trial.scenario.declared_hz) for part, one in wanted.items()}
 
 
-def _arrays(recording: Recording, noise: ArrayNoise) -> PartArrays:
+def _arrays(recording: Recording, noise: ArrayNoise, declared_hz: float | None) -> PartArrays:
     rate = recording.rate.copy(order="F")
     missing = fill_missing(rate, recording.rate_hz)
     at_rest = np.full(len(rate), recording.kind == "static")
     if recording.kind == "free":
         at_rest = find_rest(rate, recording.rate_hz, RestOptions(), recording.segment)
+    declared: dict[str, Any] = {}
+    if declared_hz and "lowpass_hz" in {one.name for one in fields(ArrayRates)}:
+        declared["lowpass_hz"] = np.full(rate.shape[1], declared_hz)
     array = TimedRates(
         rate, recording.rate_hz, recording.segment, at_rest, noise, temperature=recording.temperature,
-        stretch_time=recording.stretch_time, missing=missing,
+        stretch_time=recording.stretch_time, missing=missing, **declared,
     )  # fmt: skip
     parameters = FilterParameters.of(FusionOptions(), in_motion(recording.kind, at_rest, moved=False))
     zero = np.zeros((rate.shape[1], 2))
@@ -101,16 +104,7 @@ def _noise(trial: Trial) -> ArrayNoise:
         sampling = Sampling.of(recording.rate_hz, recording.segment)
         held = {(NOWHERE, name): column for name, column in columns.items()}
         found = noise_at_rest(FileColumns(places, held=held), sampling, MetricsOptions(), "native")
-    return _as_read(found, names)
-
-
-def _as_read(found: ArrayNoiseRecord, names: list[str]) -> ArrayNoise:
-    """As vgyro.tasks.fusion_inputs.read_noise reads the record."""
-    record = record_of(found, names, "z", "rest")
-    arw, rrw = (np.array([record[name][gyro] for gyro in names], dtype=float) for name in ("arw", "rrw"))
-    limits = [gyro for gyro in names if str(record["rrw_source"][gyro]).startswith("upper limit")]
-    note = f"no random walk was found for {', '.join(limits)}: its upper limit stands in" if limits else ""
-    return ArrayNoise(arw, rrw, np.array(record["correlation"]), note)
+    return noise_of_record(record_of(found, names, "z", "rest"), names)
 
 
 def score(
