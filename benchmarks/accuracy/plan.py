@@ -11,6 +11,7 @@ from pathlib import Path
 
 import vgyro
 from benchmarks.accuracy.scenario import Scenario, load, names
+from vgyro.fusion.packages import fingerprint
 
 SEEDS = 8
 QUICK_REST_S, QUICK_MOTION_S = 120.0, 180.0
@@ -62,7 +63,7 @@ def tasks(
 
 @lru_cache(maxsize=1)
 def _sources() -> str:
-    """Digest of all sources that the results depend on."""
+    """Digest of all sources that the results depend on, those of packages that bring methods, too."""
     known = hashlib.sha256()
     package = Path(vgyro.__file__).parent
     files = [
@@ -73,4 +74,5 @@ def _sources() -> str:
     ]
     for path in sorted(files):
         known.update(path.read_bytes())
+    known.update(fingerprint().encode())
     return known.hexdigest()

@@ -162,13 +162,9 @@ def _outcomes(known: PartArrays, methods: Sequence[Method]) -> Iterator[Row]:
         if "weights" in method.needs and not known.array.weights:
             yield _row(method, "left out", NO_WEIGHTS)
             continue
-        try:
-            outcome, seconds = timed(partial(_outcome, known, method))
-        except Exception as reason:  # A method that fails is a finding of the benchmark.
-            yield _row(method, "failed", f"{type(reason).__name__}: {reason}")
-            continue
+        outcome, seconds = timed(partial(_outcome, known, method))
         if outcome.fused is None:
-            yield _row(method, "cannot run", outcome.note)
+            yield _row(method, outcome.state, outcome.note)
             continue
         rate, time = outcome.fused.rate, recording.time
         figures = asdict(errors_of(rate, recording.truth, time, recording.rate_hz))

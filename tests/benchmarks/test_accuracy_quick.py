@@ -92,7 +92,7 @@ def test_a_method_that_fails_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(METHODS, "mine", Method("mine", "", "", True, (), mine))
     rows = score(load("plain").shorter(40.0, 60.0), 1, ["broken", "mine"])
     assert [row["state"] for row in rows] == ["failed", "ran"]
-    assert rows[0]["note"] == "LinAlgError: singular"
+    assert "LinAlgError: singular" in rows[0]["note"]
     assert rows[1]["sd"] > 0
 
 
