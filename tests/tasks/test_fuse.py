@@ -365,3 +365,38 @@ def test_what_a_method_is_and_its_deviation_reach_the_tables(analysed, monkeypat
     np.testing.assert_allclose(fused["known"], fused["average"], atol=1e-12)
     assert "sd_average" not in fused
     assert read_metadata(analysed / "fused.parquet")["units"]["sd_known"] == "deg/s"
+
+
+def test_a_method_that_fails_is_a_row_and_the_job_goes_on(analysed, monkeypatch, caplog):
+    # One ends with an error of numpy, one cannot tell its response or its cost.
+    def broken(array, parameters):  # noqa: ARG001
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    def once(array, parameters):  # noqa: ARG001
+        if len(array.rate) != int(SECONDS * RATE_HZ):
+            raise RuntimeError("not with so few samples")
+        return Fused(array.rate.mean(axis=1))
+
+    fail = {"broken": broken, "once": once}
+    for name, fuse_one in fail.items():
+        method = Method(name, name, "test", True, (), fuse_one, operations=lambda n: 1 / 0 * n, family="other")
+        monkeypatch.setitem(METHODS, name, method)
+    monkeypatch.setattr(fuse, "LEFT_OUT", ["package old-gyro 0.1: it is left out"])
+    fused, methods, moved = fuse_moved(analysed, injected_rate=INJECTED)
+    state = dict(zip(methods["method"], methods["state"], strict=True))
+    row = {name: list(methods["method"]).index(name) for name in fail}
+    assert (state["average"], state["broken"], state["once"]) == ("ran", "failed", "ran")
+    assert set(methods["state"]) <= {"ran", "cannot run", "failed"}
+    assert (methods["column"] != "").tolist() == (methods["state"] == "ran").tolist()
+    why = "LinAlgError: Singular matrix (a bug in vgyro; the traceback is in the log)"
+    assert methods["note"][row["broken"]] == f"failed: {why}"
+    assert methods["moved"][row["broken"]] == ""
+    assert "broken" not in fused
+    assert "once" in fused
+    assert "once" in moved
+    assert methods["response"][row["once"]] == ""
+    assert np.isnan(methods["dc_gain"][row["once"]])
+    assert np.isnan(methods["operations"][row["once"]])
+    assert "its response could not be measured: failed: RuntimeError" in methods["note"][row["once"]]
+    assert "broken failed" in caplog.text
+    assert "old-gyro 0.1" in caplog.text

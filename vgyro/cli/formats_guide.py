@@ -30,7 +30,7 @@ number; an empty unit means that units make no sense there. This page is written
 | `results/<dataset>/<recording>/integrity.json` | JSON: status, reasons, frames, gaps, damage, channels, rate |
 | `results/<dataset>/calibration.json` | JSON: scale factor and bias of each gyro, with intervals |
 | `results/<dataset>/<recording>/rates.parquet` | rates |
-| `results/<dataset>/noise/<axis>.json` | JSON: angle and rate random walk and correlation of the gyros of an array |
+| `results/<dataset>/noise/<axis>.json` | JSON: angle and rate random walk, correlation and Allan covariances of the gyros of an array |
 | `results/<dataset>/<recording>/<axis>/<definition>/*.parquet` | arch_lm, garch, dcc, weights |
 | `results/<dataset>/<recording>/<axis>/*.parquet` | fused, methods, allan, spectrum, correlation, metrics, crosscheck |
 | `raw/<twin>/truth/<recording>.parquet` | truth, of simulated data |
@@ -63,6 +63,8 @@ def file_formats() -> str:
     parts += [f"| `{name}` | {f.title} | {f.unit} | {_cell(f.meaning)} |\n" for name, f in FIGURES.items()]
     parts.append(METHODS_HEAD)
     for name, method in METHODS.items():
+        if method.package:
+            continue  # The document is of vgyro; another package has its own.
         needs = ", ".join([*method.needs, *(["one run a definition"] if method.per_definition else [])])
         causal = "yes" if method.causal else "no"
         parts.append(f"| `{name}` | {method.title} | {_cell(method.source)} | {causal} | {needs} |\n")

@@ -6,18 +6,15 @@ wrong with a package leaves its methods out, with one line that names it, and no
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from importlib.machinery import PathFinder
-from importlib.metadata import EntryPoint, entry_points
-from pathlib import Path
+from importlib.metadata import EntryPoint
 from typing import Any
 
 from vgyro.fusion.array import Method
+from vgyro.fusion.installed import GROUP, method_entries, package_of
 
-GROUP = "vgyro.methods"
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 RESERVED = ("time", "segment")
 PREFIX = "sd_"
@@ -32,7 +29,7 @@ def methods_of_packages(known: Collection[str]) -> tuple[list[Method], list[str]
     """
     methods: dict[str, Method] = {}
     problems: list[str] = []
-    for entry in _entries():
+    for entry in method_entries():
         label = package_of(entry)
         try:
             found = list(_methods(entry.load()))
@@ -50,43 +47,8 @@ def methods_of_packages(known: Collection[str]) -> tuple[list[Method], list[str]
     return list(methods.values()), problems
 
 
-def package_of(entry: EntryPoint) -> str:
-    """Name and version of the package that has the entry point."""
-    return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "of no name"
-
-
-def fingerprint() -> str:
-    """SHA-256 over names, versions, entry points and Python sources of the packages that bring methods.
-
-    Nothing is imported for it. Empty where there are no such packages.
-    """
-    entries = _entries()
-    if not entries:
-        return ""
-    digest = hashlib.sha256()
-    for entry in entries:
-        digest.update(f"{package_of(entry)}\0{entry.name}\0{entry.value}\0".encode())
-        for path in _sources(entry.module.partition(".")[0]):
-            digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
-
-
-def _entries() -> list[EntryPoint]:
-    return sorted(entry_points(group=GROUP), key=lambda entry: (package_of(entry), entry.name))
-
-
 def _where(entry: EntryPoint) -> str:
     return f"package {package_of(entry)}, entry point {entry.name!r} of {GROUP}"
-
-
-def _sources(module: str) -> list[Path]:
-    """The Python files of a top-level module or package."""
-    found = PathFinder.find_spec(module)
-    if found is None:
-        return []
-    if found.submodule_search_locations:
-        return sorted(path for folder in found.submodule_search_locations for path in Path(folder).rglob("*.py"))
-    return [Path(found.origin)] if found.origin and Path(found.origin).is_file() else []
 
 
 def _methods(thing: Any) -> Iterator[Any]:

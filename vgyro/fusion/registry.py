@@ -230,8 +230,9 @@ def _run(array: ArrayRates, parameters: FilterParameters, method: Method) -> Out
         return Outcome(method, definition, "", None, failure(method, error), failed=True)
     broken = _not_finite(np.isfinite(fused.rate))
     if broken:
-        logging.error("%s failed: %s", method.name, broken)
-        return Outcome(method, definition, "", None, f"failed: of its rate {broken}", failed=True)
+        note = f"failed: of its rate {broken}"
+        logging.error("%s %s", method.name, note)
+        return Outcome(method, definition, "", None, note, failed=True)
     column = f"{method.name}[{definition}]" if definition else method.name
     return Outcome(method, definition, column, fused, fused.note)
 

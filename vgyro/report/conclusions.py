@@ -10,6 +10,7 @@ import numpy as np
 from vgyro.report.arch import verdicts
 from vgyro.report.best import motion_sentences, rest_sentences
 from vgyro.report.crosscheck import failures
+from vgyro.report.failed import failed_sentences
 from vgyro.report.faults import fault_sentences, faulty_gyros
 from vgyro.report.fits import NO_USE
 from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart, rows_of
@@ -48,7 +49,7 @@ class BadGyro:
 
 def conclude(dataset: DatasetPart) -> list[Conclusion]:
     """All sentences, the most important first."""
-    found = suspicion_sentences(dataset) + moved_sentences(dataset)
+    found = suspicion_sentences(dataset) + moved_sentences(dataset) + failed_sentences(dataset)
     found += _gyro_sentences(dataset) + fault_sentences(dataset)
     for array in main_arrays(dataset):
         found += rest_sentences(dataset, array)

@@ -12,6 +12,7 @@ from vgyro.report.conclusions import BAD_RULE, bad_gyros, conclude, main_arrays
 from vgyro.report.conventions import conventions_part, provenance_part
 from vgyro.report.crosscheck import crosscheck_part
 from vgyro.report.delays import delays_part
+from vgyro.report.failed import recommended_failed
 from vgyro.report.faults import FAULT_RULE, faults_part
 from vgyro.report.html import bullets, details, heading, join, macro, paragraph
 from vgyro.report.methods import dynamic_table, response_table, rest_tables
@@ -98,7 +99,8 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
     bad = bad_gyros(dataset)
     best = _best_of_all(dataset)
     usable = [part for part in dataset.recordings if part.usable]
-    suspect = [part for part in usable if part.status == "suspect"]
+    suspect = any(part.status == "suspect" for part in usable)
+    failed = recommended_failed(dataset)
     return {
         "dataset": dataset.name,
         "title": dataset.title,
@@ -115,8 +117,9 @@ def headline(dataset: DatasetPart) -> dict[str, Any]:
         "status": "refused"
         if not usable
         else "suspect"
-        if suspect or len(usable) < len(dataset.recordings)
+        if suspect or failed or len(usable) < len(dataset.recordings)
         else "good",
+        "recommended_failed": failed,
     }
 
 

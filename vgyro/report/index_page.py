@@ -26,6 +26,7 @@ COLUMNS = (
 )
 TONES: dict[str, Tone] = {"good": "good", "suspect": "warn", "refused": "bad"}
 MOST_NAMED = 4
+RECOMMENDED_FAILED = "recommended method failed"
 
 
 def render_index(
@@ -67,7 +68,7 @@ def _row(record: Record) -> list[Cell]:
         _bad(record["bad_gyros"]),
         *_best(record["best"]),
         Cell(record["scale"], tone="" if record["scale"] == "measured" else "warn"),
-        Cell(record["status"], tone=TONES[record["status"]]),
+        Cell(record["status"], RECOMMENDED_FAILED if record.get("recommended_failed") else "", TONES[record["status"]]),
     ]
 
 

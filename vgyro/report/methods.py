@@ -78,8 +78,11 @@ LOWER_IS_BETTER = (
     "error_sigma_scaled",
     "angle_drift_60s",
 )
-NEEDS = {"arw": "ARW", "rrw": "RRW", "correlation": "ρ", "weights": "H_t"}
-NEEDS_HINT = "what it takes beside the rates; ρ: correlation of the noise; H_t: weights of the volatility analysis"
+NEEDS = {"arw": "ARW", "rrw": "RRW", "correlation": "ρ", "scales": "C(τ)", "weights": "H_t"}
+NEEDS_HINT = (
+    "what it takes beside the rates; ρ: correlation of the noise; C(τ): Allan covariances at rest; H_t: weights of the "
+    "volatility analysis"
+)
 METHOD, RESPONSE = "the method", "response of the method"
 PROPERTIES = (
     Column("runs", numeric=False, hint="causal: sample t uses nothing later than t; offline: it does", group=METHOD),
@@ -92,7 +95,12 @@ PROPERTIES = (
     Column("known", numeric=False, hint="how the four are known", group=RESPONSE),
 )
 # The recommended rows first: of some forty they are the ones to look for.
-FAMILIES = {"ours": "Methods of vgyro", "baseline": "Baselines", "paper": "Methods of the papers"}
+FAMILIES = {
+    "ours": "Methods of vgyro",
+    "baseline": "Baselines",
+    "paper": "Methods of the papers",
+    "other": "Methods of other packages",
+}
 FIRST = {"recommended": 0, "recommended_unsmoothed": 1}
 MOST_WIDE = 7
 LIMITS = "Below each figure: its limits."
@@ -116,6 +124,9 @@ RESPONSE_WORDS = (
     "is done once a recording is left out. Bandwidth and delay are the method's own, without the gyro's; “not limited” "
     "passes what the gyro passes."
 )
+
+FAILED = "failed"
+"""State of a method that ended with an error; its note says so."""
 
 MakeCells = Callable[[Mapping[str, Any]], list[Cell]]
 
@@ -235,6 +246,8 @@ def _method_row(method: Mapping[str, Any], of_method: MakeCells, width: int, not
     first = Cell(method["title"], method["definition"], notes=remarks, hint=method["source"])
     if method["column"]:
         return Row((first, *of_method(method)))
+    if method.get("state") == FAILED:
+        return Row((first, Cell(str(method["note"]), tone="bad", span=width)))
     return Row((first, Cell(f"not run: {method['note']}", tone="muted", span=width)))
 
 

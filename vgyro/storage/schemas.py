@@ -165,13 +165,14 @@ _ALL = (
         _TIME, _SEGMENT,
         Column("{method}", "deg/s", "error of the virtual gyroscope; only methods that answer to a constant rate"),
     )),
-    Schema("methods", 3, "what ran, and what it is", (
+    Schema("methods", 4, "what ran, and what it is", (
         Column("method", "", "name in vgyro.fusion.METHODS"),
         Column("definition", "", "definition of r_t where the method has one"),
         Column("column", "", "column in fused.parquet; empty where the method could not run"),
+        Column("state", "", "ran; cannot run, as the method found by itself; failed: it ended with an error"),
         Column("title", "", "name for people"),
-        Column("source", "", "paper and equation"),
-        Column("family", "", "baseline, paper or ours"),
+        Column("source", "", "paper and equation; name and version of the package, where it is not vgyro"),
+        Column("family", "", "baseline, paper, ours, or other: of another package"),
         Column("needs", "", "what it takes beside the rates"),
         Column("inferred", "", "what its paper does not say, and how it was filled in"),
         Column("operations", "1", "floating-point operations a sample, all passes; NaN: not counted"),
@@ -183,7 +184,7 @@ _ALL = (
         Column("passes", "", "passes of a first-order low-pass: 1 forward, 2 forward and back, 0 other shape or none"),
         Column("response", "", "how the four are known: analytic, or measured by adding a known motion"),
         Column("moved", "", "what a constant rate changes: column in moved.parquet, or why it changes nothing"),
-        Column("note", "", "what was inferred, or why it could not run"),
+        Column("note", "", "what was inferred, or why it could not run or failed"),
     )),
     Schema("allan", 2, "Allan deviations of every series", (
         Column("series", "", "gyro, or column of fused.parquet"),

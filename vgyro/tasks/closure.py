@@ -7,17 +7,24 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
+from vgyro.fusion.installed import fingerprint
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT.name
+REGISTRY = f"{PACKAGE}.fusion.registry"
 
 
 def code_hash(module: str) -> str:
     """SHA-256 over the sources of `module` and of everything in the package that it imports, at any depth.
 
-    Imports inside functions count. Templates and other data files of a package that is reached count too.
+    Imports inside functions count. Templates and other data files of a package that is reached count too; so do, for
+    what reaches the registry of fusion methods, the installed packages that bring some: their versions and sources.
     """
     digest = hashlib.sha256()
-    for name in sorted(import_closure(module)):
+    reached = import_closure(module)
+    if REGISTRY in reached:
+        digest.update(fingerprint().encode())
+    for name in sorted(reached):
         path = _source(name)
         digest.update(name.encode() + b"\0" + path.read_bytes())
         for source in _c_sources(path):

@@ -17,13 +17,14 @@ import numpy as np
 import pyarrow as pa
 
 from vgyro.dataset import AT_REST
-from vgyro.fusion import Outcome, measured_response, run_methods, select
+from vgyro.fusion import Method, Outcome, measured_response, run_methods, select
+from vgyro.fusion.registry import LEFT_OUT, failure
 from vgyro.storage.tables import ROW_GROUP, TableWriter, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.fusion_inputs import OpenArray, open_array
 from vgyro.tasks.rates_file import DEVIATION
 
-TEXTS = ("method", "definition", "column", "title", "source", "family", "needs", "inferred")
+TEXTS = ("method", "definition", "column", "state", "title", "source", "family", "needs", "inferred")
 FIGURES = ("dc_gain", "bandwidth_hz", "noise_bandwidth_hz", "delay_s")
 Row = dict[str, Any]
 ONE_GYRO = "one gyro: there is nothing to fuse"
@@ -37,6 +38,8 @@ def main(task: Task) -> None:
     moved.parquet is of the same recording with injected_rate added to every gyro, less that rate: of the methods that
     answer to a constant rate. An array of one gyro gives tables without a method, and a note in their metadata.
     """
+    for problem in LEFT_OUT:
+        logging.warning(problem)
     opened = open_array(task)
     extra = {"rate_hz": opened.rates.rate_hz}
     note = {}
@@ -149,28 +152,42 @@ def keep_error(added: float, moved: Columns, outcome: Outcome) -> tuple[tuple[st
 
 
 def describe(outcome: Outcome, opened: OpenArray) -> Row:
-    """A row of methods.parquet but for `moved`; figures are NaN where the method could not run."""
-    method, fused = outcome.method, outcome.fused
+    """A row of methods.parquet but for `moved`; figures are NaN where they are not known."""
+    method = outcome.method
     texts = (
-        method.name, outcome.definition, outcome.column, method.title, method.source, method.family,
+        method.name, outcome.definition, outcome.column, outcome.state, method.title, method.source, method.family,
         ", ".join(method.needs), method.inferred,
     )  # fmt: skip
-    figures, how, passes = dict.fromkeys(FIGURES, float("nan")), "", 0
-    if fused is not None:
-        passes = fused.passes
-        known = isfinite(fused.dc_gain)
-        source = (
-            fused
-            if known
-            # Gain and delay are the method's, whoever computes: the fast engine measures them.
-            else measured_response(
-                method.fuse, opened.rates, replace(opened.parameters, definition=outcome.definition, engine="native")
-            )
-        )
-        figures, how = {name: getattr(source, name) for name in FIGURES}, "analytic" if known else "measured"
-    operations = float(method.operations(len(opened.gyros)))
-    row = {**dict(zip(TEXTS, texts, strict=True)), "operations": operations, "causal": method.causal, **figures}
-    return {**row, "passes": passes, "response": how, "note": outcome.note}
+    figures, how, why_not = response_of(outcome, opened)
+    row = {**dict(zip(TEXTS, texts, strict=True)), "operations": operations_of(method, len(opened.gyros))}
+    row |= {"causal": method.causal, **figures, "passes": 0 if outcome.fused is None else outcome.fused.passes}
+    return {**row, "response": how, "note": "; ".join(part for part in (outcome.note, why_not) if part)}
+
+
+def response_of(outcome: Outcome, opened: OpenArray) -> tuple[dict[str, float], str, str]:
+    """FIGURES of what came out; how they are known, "" where they are not; and why not."""
+    unknown = dict.fromkeys(FIGURES, float("nan"))
+    if outcome.fused is None:
+        return unknown, "", ""
+    if isfinite(outcome.fused.dc_gain):
+        return {name: float(getattr(outcome.fused, name)) for name in FIGURES}, "analytic", ""
+    # Gain and delay are the method's, whoever computes: the fast engine measures them.
+    parameters = replace(opened.parameters, definition=outcome.definition, engine="native")
+    try:
+        measured = measured_response(outcome.method.fuse, opened.rates, parameters)
+    except (Exception, SystemExit) as error:
+        logging.exception("the response of %s is not known", outcome.method.name)
+        return unknown, "", f"its response could not be measured: {failure(outcome.method, error)}"
+    return {name: getattr(measured, name) for name in FIGURES}, "measured", ""
+
+
+def operations_of(method: Method, gyros: int) -> float:
+    """Floating-point operations a sample; NaN where the method cannot tell."""
+    try:
+        return float(method.operations(gyros))
+    except Exception:
+        logging.exception("the operations of %s are not known", method.name)
+        return float("nan")
 
 
 def table_of(rows: list[Row]) -> pa.Table:
