@@ -11,7 +11,7 @@ from pathlib import Path
 
 import vgyro
 from benchmarks.accuracy.scenario import Scenario, load, names
-from vgyro.fusion.packages import fingerprint
+from vgyro.fusion.installed import fingerprint
 
 SEEDS = 8
 QUICK_REST_S, QUICK_MOTION_S = 120.0, 180.0

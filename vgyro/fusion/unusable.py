@@ -15,6 +15,8 @@ import numpy as np
 from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused
 
 Fuse = Callable[[ArrayRates, FilterParameters], Fused]
+OF_GYROS = ("missing", "lowpass_hz")
+"""Fields of ArrayRates whose last axis is that of the gyros, or None."""
 FIRST_LOOK = 4096
 """Samples that are compared before all are."""
 
@@ -105,13 +107,14 @@ def _with_noise(found: Usable, noise: ArrayNoise) -> Usable:
 def _only(array: ArrayRates, kept: list[int]) -> ArrayRates:
     """The array of some of the gyros; without weights, which are of all of them."""
     faults = tuple(replace(one, gyro=kept.index(one.gyro)) for one in array.faults if one.gyro in kept)
+    columns = {name: getattr(array, name, None) for name in OF_GYROS}
     return replace(
         array,
         rate=np.asfortranarray(array.rate[:, kept]),
         noise=array.noise.of(kept),
-        missing=None if array.missing is None else array.missing[:, kept],
         faults=faults,
         weights={},
         no_weights={},
         deviations={},
+        **{name: values[..., kept] for name, values in columns.items() if values is not None},
     )
