@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,8 @@ from benchmarks.accuracy.summary import COLUMNS, RECOMMENDED, TINY, Interval, Ro
 
 WORTH = 1.02
 """A part brings something on a line where leaving it out costs this much."""
+HONEST = 1.25
+"""It makes the s.d. honest where without it the NEES is this factor farther from 1."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,12 @@ class Change:
     def matters(self) -> bool:
         """Does the part change the error by 2 % or more, to either side?"""
         return not 1 / WORTH < self.most < WORTH
+
+    @property
+    def honesty(self) -> float:
+        """How much farther from 1 the NEES is without the part, a factor; below 1: nearer. 1 where there is no s.d."""
+        usual, without = (abs(math.log(one)) if one > 0 else math.nan for one in self.nees)
+        return math.exp(without - usual) if math.isfinite(without - usual) else 1.0
 
 
 def changes(rows_with: Sequence[Row], rows_without: Sequence[Row]) -> list[Change]:
@@ -66,11 +75,17 @@ def _change(part: str, line: str, method: str, pairs: Sequence[tuple[Row, Row]])
 
 @dataclass(frozen=True)
 class PartSummary:
-    """brings, costs : the changes that matter, largest first;  cpu : seconds without / with, over all lines;  lines"""
+    """A part over all lines.
+
+    brings, costs : the changes of the error that matter, largest first;  honest, not_honest : those of the NEES
+    cpu : seconds without / with;  lines : on how many both runs came out
+    """
 
     part: str
     brings: list[Change]
     costs: list[Change]
+    honest: list[Change]
+    not_honest: list[Change]
     cpu: float
     lines: int
 
@@ -82,6 +97,8 @@ def by_part(found: Sequence[Change]) -> list[PartSummary]:
         own = [one for one in found if one.part == part]
         brings = sorted((one for one in own if one.matters and one.most > 1), key=lambda one: -one.most)
         costs = sorted((one for one in own if one.matters and one.most < 1), key=lambda one: one.most)
+        honest = sorted((one for one in own if one.honesty >= HONEST), key=lambda one: -one.honesty)
+        not_honest = sorted((one for one in own if one.honesty <= 1 / HONEST), key=lambda one: one.honesty)
         cpu = geometric([one.cpu for one in own if one.method == "recommended" and one.cpu > 0]).value
-        summaries.append(PartSummary(part, brings, costs, cpu, len({one.line for one in own})))
+        summaries.append(PartSummary(part, brings, costs, honest, not_honest, cpu, len({one.line for one in own})))
     return summaries

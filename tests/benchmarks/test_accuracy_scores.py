@@ -156,12 +156,14 @@ def test_bounds_pass_what_they_were_set_from_and_what_is_better(tmp_path: Path) 
 def test_a_part_that_brings_and_one_that_costs() -> None:
     usual = [row("recommended", seed, 1.0) for seed in (1, 2)]
     left = [row("recommended", seed, 1.1, without="slow", cpu_s=0.5) for seed in (1, 2)]
-    left += [row("recommended", seed, 0.9, without="risk") for seed in (1, 2)]
+    left += [row("recommended", seed, 0.9, without="risk", nees=2.0) for seed in (1, 2)]
     slow, risk = by_part(changes(usual, left))
     assert slow.brings[0].most == pytest.approx(1.1)
     assert slow.costs == []
     assert slow.cpu == pytest.approx(0.5)
     assert risk.costs[0].most == pytest.approx(0.9)
+    assert risk.honest[0].honesty == pytest.approx(2.0)
+    assert slow.honest == slow.not_honest == risk.not_honest == []
 
 
 def test_before_and_after() -> None:
