@@ -22,6 +22,7 @@ from vgyro.fusion import METHODS, ArrayRates, FilterParameters, Fused, Method
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.timeout(1800)
 def test_a_quick_run_keeps_within_its_bounds(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "benchmarks.accuracy", "--quick", "--processes", "1", "--out", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
