@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from vgyro.fusion.array import ArrayRates
 
 BLOCK_S = 10.0
 """Length of the means in which a gyro's offset from the others is followed, s: long enough to average its noise, short
@@ -40,6 +45,24 @@ def fill_missing(rate: np.ndarray, rate_hz: float) -> np.ndarray | None:
         gone = missing[:, gyro]
         rate[gone, gyro] = common[gone] + _own_offset(rate[:, gyro], gone, common, length)
     return missing
+
+
+def unseen(array: ArrayRates) -> np.ndarray | None:
+    """Samples of which no gyro says anything, bool [T]; None: there are none. Made once for a recording."""
+
+    def find() -> np.ndarray | None:
+        if array.missing is None:
+            return None
+        lost = np.asarray(array.missing.all(axis=1))
+        return lost if lost.any() else None
+
+    return array.once("unseen", find)
+
+
+def away(missing: np.ndarray, least: int) -> np.ndarray:
+    """Stretches [M, 2] of `least` samples or more in which one gyro has no value; missing [T] of bool."""
+    edges = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2)
+    return edges[edges[:, 1] - edges[:, 0] >= least]
 
 
 def _pieces(samples: int) -> list[slice]:

@@ -14,6 +14,7 @@ import numpy as np
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
+from vgyro.fusion.missing import away
 
 BLOCK_S = 0.25
 FEWEST_SAMPLES = 16
@@ -36,7 +37,7 @@ class BlockMoments:
     low, high [M]         : first and last block of the window about each that its slow part is the mean over
     square [M, N, N]      : Σ dd' over the samples, (deg/s)², d = y - mean over the gyros, or over the recording
     mean [M, N]           : mean of d, deg/s
-    excluded [M, N]       : at fault, or stuck
+    excluded [M, N]       : at fault, stuck, or without a value for as long as a fine block
     """
 
     start: np.ndarray
@@ -93,6 +94,8 @@ def block_moments(array: ArrayRates, size: int | None = None, own: bool = False)
                 square[blocks, one, other] = square[blocks, other, one] = _sums(values[one] * values[other], begin)
     bad = _stuck(step, stop - start)
     _mark(bad, start, stop, excluded(array.faults, len(array.rate), gyros))
+    if array.missing is not None:
+        _mark(bad, start, stop, [away(column, block_size(array.rate_hz)) for column in array.missing.T])
     return BlockMoments(start, stop, low, high, square, mean, bad)
 
 
