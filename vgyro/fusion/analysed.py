@@ -14,13 +14,16 @@ import numpy as np
 
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights
+from vgyro.fusion.missing import unseen
 from vgyro.fusion.motion_models import Motion
 from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.parity_dcc import prefer_dcc
 from vgyro.fusion.prepared import prepared
+from vgyro.fusion.quantised import least_variance
 from vgyro.fusion.slow import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.smoother import choose_motion
+from vgyro.fusion.unseen import StandIn
 
 DCC = ("dcc", "in_sample", "residual")
 CAUSAL_DCC = ("dcc", "causal", "residual")
@@ -28,21 +31,38 @@ CAUSAL_DCC = ("dcc", "causal", "residual")
 
 @dataclass(frozen=True)
 class Analysed:
-    """array : as prepared;  variances : R_t;  weights : of least variance for it;  slow : b;  note : what was chosen"""
+    """What is known of a recording.
+
+    array : as prepared;  variances : R_t;  weights : of least variance for it;  slow : b;  note : what was chosen
+    guess : what is likely where no gyro says anything; None: there are no such samples, or nothing is known
+    """
 
     array: ArrayRates
     variances: Variances
     weights: SampleWeights
     slow: SlowErrors
     note: str
+    guess: StandIn | None = None
 
     def rate(self) -> np.ndarray:
         """u(t)'(y - b) [T], deg/s."""
         return combined_without(self.array, self.weights, self.slow)
 
     def variance(self) -> np.ndarray:
-        """Variance u'R_t·u of its white noise [T], (deg/s)² a sample."""
-        return self.variances.combined_variance()[self.variances.block_of_sample()]
+        """Variance u'R_t·u of its white noise [T], (deg/s)² a sample; infinite where no gyro says anything."""
+        return self.at_samples(self.variances.combined_variance())
+
+    def at_samples(self, variance: np.ndarray) -> np.ndarray:
+        """Variances [M] of the blocks at the samples [T]; infinite where no gyro says anything."""
+        found = variance[self.variances.block_of_sample()]
+        lost = unseen(self.array)
+        if lost is not None:
+            found[lost] = np.inf
+        return found
+
+    def bridged(self, rate: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A rate and its variance [T] as a smoother takes them: with what is likely where no gyro says anything."""
+        return (rate, variance) if self.guess is None else self.guess.put(rate, variance)
 
 
 def analysed(array: ArrayRates, parameters: FilterParameters) -> Analysed:
@@ -56,6 +76,9 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
     def choose() -> Motion:
         known = analysed(array, parameters)
         moving = ~array.at_rest if array.at_rest.any() else None
+        lost = unseen(known.array)
+        if lost is not None:
+            moving = ~lost if moving is None else moving & ~lost
         return choose_motion(
             known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
             parameters.motion_models, parameters.engine, moving,
@@ -67,10 +90,10 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
 def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
     ready = prepared(raw, parameters)
     array = ready.array
-    variances = shared_variances(array, parameters, True)
+    variances = _not_below(shared_variances(array, parameters, True), ready.step)
     score = prefer_dcc(array, parameters, variances)
     if score.prefer and parameters.has("dcc"):
-        variances = _of_dcc(array, parameters, variances)
+        variances = _not_below(_of_dcc(array, parameters, variances), ready.step)
     blocks = SlowBlocks.of(array)
     lasting = variances.variance * (1.0 + variances.phi) / (1.0 - variances.phi)
     white = blocks.mean_of(variances.start, lasting)
@@ -79,7 +102,15 @@ def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
     left_out = f"{len(array.faults)} faults left out" if array.faults else ""
     notes = [*ready.notes, variances.note, score.note, slow.note, left_out]
     weights = variances.sample_weights(parameters.engine)
-    return Analysed(array, variances, weights, slow, "; ".join(note for note in notes if note))
+    return Analysed(array, variances, weights, slow, "; ".join(note for note in notes if note), ready.guess)
+
+
+def _not_below(variances: Variances, step: np.ndarray) -> Variances:
+    """No gyro is better than its step [N], deg/s, allows."""
+    least = least_variance(step)
+    if not (variances.variance < least).any():
+        return variances
+    return replace(variances, variance=np.maximum(variances.variance, least))
 
 
 def _of_dcc(array: ArrayRates, parameters: FilterParameters, variances: Variances) -> Variances:

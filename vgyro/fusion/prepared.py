@@ -6,17 +6,30 @@ gives one, and says in a note what it found.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from vgyro.fusion.array import ArrayRates, FilterParameters
+from vgyro.fusion.clipped import without_clipped
+from vgyro.fusion.missing import unseen
+from vgyro.fusion.quantised import steps
+from vgyro.fusion.tails import without_tails
+from vgyro.fusion.unseen import StandIn, stand_in
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """array : as the methods take it;  notes : what was found"""
+    """The rates made ready.
+
+    array : as the methods take it;  notes : what was found;  step : of each gyro's values [N], deg/s, 0: none
+    guess : in motion, what is likely where no gyro says anything; None: there are no such samples
+    """
 
     array: ArrayRates
+    step: np.ndarray
     notes: tuple[str, ...] = ()
+    guess: StandIn | None = None
 
 
 def prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
@@ -24,5 +37,22 @@ def prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
     return array.once(("prepared", parameters), lambda: _prepared(array, parameters))
 
 
-def _prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:  # noqa: ARG001
-    return Prepared(array)
+MENDED = {"clipped": "clipped", "outlier": "tails"}
+"""Faults of single samples, and the parts that mend them: the rest of the stretch is as good as any."""
+
+
+def _prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
+    notes, lost = [], unseen(array)
+    mended = [kind for kind, part in MENDED.items() if parameters.has(part)]
+    faults = tuple(one for one in array.faults if one.kind not in mended)
+    if len(faults) < len(array.faults):
+        array = replace(array, faults=faults)
+    step = steps(array) if parameters.has("quantised") else np.zeros(array.rate.shape[1])
+    if parameters.has("clipped"):
+        array, note = without_clipped(array)
+        notes.append(note)
+    if parameters.has("tails"):
+        array, note = without_tails(array, step)
+        notes.append(note)
+    guess = stand_in(array, lost) if parameters.in_motion else None
+    return Prepared(array, step, tuple(filter(None, notes)), guess)

@@ -23,6 +23,7 @@ from vgyro.fusion.motion_models import UNLIMITED, SteadyGain, fixed_bandwidth
 from vgyro.fusion.parity_band import in_band
 from vgyro.fusion.slow import combined_without, slow_variance
 from vgyro.fusion.smoothed import Signal, smoothed
+from vgyro.fusion.smoother import mean_variance
 from vgyro.fusion.weights import min_variance_weights
 
 
@@ -33,8 +34,10 @@ def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
     weights = known.weights if not note else variances.sample_weights(parameters.engine)
     shares = variances.weights(parameters.engine)
     signal = Signal(
-        combined_without(known.array, weights, known.slow),
-        known.variances.combined_variance(shares)[variances.block_of_sample()],
+        *known.bridged(
+            combined_without(known.array, weights, known.slow),
+            known.at_samples(known.variances.combined_variance(shares)),
+        ),
         known.variances.colour(shares),
         weights,
         "; ".join(filter(None, [known.note, note])),
@@ -46,7 +49,7 @@ def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
 
 def passed_hz(array: ArrayRates, parameters: FilterParameters, known: Analysed) -> float:
     """Noise-equivalent bandwidth, one-sided, Hz, of the smoother; NaN: it is not limited, or not known."""
-    mean, colour = float(np.mean(known.variance())), known.variances.colour()
+    mean, colour = mean_variance(known.variance()), known.variances.colour()
     try:
         if parameters.in_motion:
             motion = shared_motion(array, parameters)

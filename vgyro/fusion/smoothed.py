@@ -22,7 +22,7 @@ from vgyro.fusion.conditional import conditional
 from vgyro.fusion.fixed import median
 from vgyro.fusion.motion_models import Activity, Motion
 from vgyro.fusion.parity import Variances, shared_variances
-from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, smooth
+from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, mean_variance, smooth
 
 SLOW_BESIDE_POLE = 0.5
 """The sensor's pole is undone where the smoother's bandwidth is below this share of the pole's frequency."""
@@ -192,9 +192,9 @@ def shared_activity(array: ArrayRates, parameters: FilterParameters) -> Activity
 
     def find() -> Activity | None:
         known, motion = analysed(array, parameters), shared_motion(array, parameters)
-        variance = known.variance()
+        rate, variance = known.bridged(known.rate(), known.variance())
         return find_activity(
-            known.rate(), variance, array.segment, array.rate_hz, motion, known.variances.colour(),
+            rate, variance, array.segment, array.rate_hz, motion, known.variances.colour(),
             *_standstill(array, parameters, variance),
         )  # fmt: skip
 
@@ -207,15 +207,17 @@ def _standstill(
     """Where the board stands still in a recording in motion, and how the rate moves there; None: nowhere."""
     if not array.at_rest.any():
         return None, None
-    return array.at_rest, fixed_bandwidth(parameters.bandwidth_hz, float(np.mean(variance)), array.rate_hz)
+    return array.at_rest, fixed_bandwidth(parameters.bandwidth_hz, mean_variance(np.asarray(variance)), array.rate_hz)
 
 
 def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> tuple[Smoothed, np.ndarray]:
     """The smoother of a fixed bandwidth, and the variance [T] of what it gives where the noise changes."""
-    mean = float(np.mean(signal.variance))
+    mean = mean_variance(np.asarray(signal.variance))
     motion = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)
     result = smooth(signal.rate, mean, array.segment, array.rate_hz, motion, 0.0, parameters.engine)
-    share = np.broadcast_to(np.asarray(signal.variance) / mean, array.segment.shape)
+    # Where no gyro says anything the rate at rest is that of the samples about it.
+    told = np.where(np.isfinite(signal.variance), signal.variance, mean)
+    share = np.broadcast_to(told / mean, array.segment.shape)
     if math.isfinite(result.bandwidth_hz) and result.passes:
         # Far below the sensor's pole coloured noise is white noise of its long-run variance.
         colour = (1.0 + signal.colour) / (1.0 - signal.colour)

@@ -26,6 +26,8 @@ __all__ = ["Smoothed", "choose_motion", "fixed_bandwidth", "smooth"]
 
 FREE = 1e8
 """Process variance over that of the noise at which neighbours say nothing (1e-8 of the weight)."""
+NOTHING = 1e3
+"""A sample of so many times the usual variance says next to nothing."""
 JUMP_S = 0.1
 """Means over so long on both sides of an end of standstill show whether the rate jumps there."""
 
@@ -112,8 +114,9 @@ def smooth(
 
 
 def mean_variance(r: np.ndarray) -> float:
-    """Mean of the finite values of r, one or [T]."""
-    return float(np.mean(r, where=np.isfinite(r)))
+    """Mean of r, one or [T], where it is not infinite, nor so large that it says next to nothing."""
+    known = r[np.isfinite(r)]
+    return float(np.mean(known[known <= NOTHING * np.median(known)]))
 
 
 def stretches(segment: np.ndarray) -> Iterator[slice]:
