@@ -56,6 +56,8 @@ def test_weights_on_scales():
     shares = large(np.ones((20, 4, 4)))
     assert shares[14] / shares[19] == pytest.approx(0.5 * (1 + np.exp(-5)))
     assert (np.diff(large(wavelet)) > 0).all()
+    # 10 scales alike: half of the sum is of the fifth, 16 samples, or more.
+    assert "averaging times of 16 s or more" in scale_wise_all(record(2048), PARAMETERS).note
     assert large(wavelet)[: scales // 2].sum() < 0.1
 
 

@@ -13,7 +13,8 @@ from vgyro.fusion.unusable import on_usable, usable_gyros
 PARAMETERS = FilterParameters()
 LEAVE_OUT = (
     "bayard_ploen", "chang_2008", "stubberud_2008", "al_majed", "jiang_markov", "jiang_random_walk", "xue_2012",
-    "chang_2012", "vaccaro_zaki", "scale_wise_all", "scale_wise_large",
+    "chang_2012", "vaccaro_zaki", "scale_wise_all", "scale_wise_large", "inverse_variance_arw", "inverse_variance_rrw",
+    "frequency_weights",
 )  # fmt: skip
 ARW = np.array([0.05, 0.1, 0.1, 0.3])
 

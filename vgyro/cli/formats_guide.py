@@ -30,7 +30,7 @@ number; an empty unit means that units make no sense there. This page is written
 | `results/<dataset>/<recording>/integrity.json` | JSON: status, reasons, frames, gaps, damage, channels, rate |
 | `results/<dataset>/calibration.json` | JSON: scale factor and bias of each gyro, with intervals |
 | `results/<dataset>/<recording>/rates.parquet` | rates |
-| `results/<dataset>/noise/<axis>.json` | JSON: angle and rate random walk, correlation and Allan covariances of the gyros of an array |
+| `results/<dataset>/noise/<axis>.json` | JSON: random walks, correlation, Allan covariances of an array's gyros |
 | `results/<dataset>/<recording>/<axis>/<definition>/*.parquet` | arch_lm, garch, dcc, weights |
 | `results/<dataset>/<recording>/<axis>/*.parquet` | fused, methods, allan, spectrum, correlation, metrics, crosscheck |
 | `raw/<twin>/truth/<recording>.parquet` | truth, of simulated data |

@@ -75,10 +75,11 @@ def scale_wise(
     A = np.tensordot(shares, wavelet, axes=1)
     weights = np.zeros(array.rate.shape[1])
     weights[used] = least_variance(A)
-    half = scales.tau[int(np.searchsorted(np.cumsum(shares), 0.5))]
+    parts = np.cumsum(_shares(shares * np.trace(wavelet, axis1=1, axis2=2)))
+    half = scales.tau[int(np.searchsorted(parts, 0.5))]
     singular = flaw(A)
     notes = [
-        f"half of the weight on scales of {half:.3g} s or more",
+        f"half of the sum is of averaging times of {half:.3g} s or more",
         f"pseudo-inverse: {singular}" if singular else "",
         not_known(weights, used),
         origin,
