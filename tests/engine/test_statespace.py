@@ -13,8 +13,8 @@ from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError, EngineError
 
 ENGINES = ("native", "reference")
-# States and pole; coloured noise takes one of the five states that there are.
-JOINT = [(states, pole) for states in range(1, 6) for pole in (0.0, 0.6) if states < 5 or not pole]
+# States and pole; coloured noise takes one of the states that there are.
+JOINT = [(states, pole) for states in range(1, 12) for pole in (0.0, 0.6) if states < 11 or not pole]
 
 
 def model_of(states, pole=0.0, regimes=1, seed=3):
@@ -156,8 +156,8 @@ def test_what_cannot_be_used_is_named(which):
         module.smooth(z, r[:7], model)
     with pytest.raises(DataError, match="regime 2 is asked for, and the model has 1"):
         module.smooth(z, r, model, regime)
-    with pytest.raises(DataError, match="6 states are too many"):
-        module.smooth(z, r, model_of(5, 0.5))
+    with pytest.raises(DataError, match="12 states are too many"):
+        module.smooth(z, r, model_of(11, 0.5))
 
 
 @pytest.mark.parametrize("which", ENGINES)

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from vgyro import engine
 from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError
-from vgyro.fusion.motion_models import Motion, SteadyGain, dynamics, fixed_bandwidth, random_walk_keep
+from vgyro.fusion.motion_models import Line, Motion, SteadyGain, dynamics, fixed_bandwidth, random_walk_keep
 
 MODELS = [
     ("random_walk", {"q": 3.0}),
@@ -84,32 +84,6 @@ def test_pair_of_oscillators(period):
     np.testing.assert_allclose(kept / size, found.stationary / size, atol=1e-12)
 
 
-@pytest.mark.parametrize("size", [2, 7, 12])
-@pytest.mark.parametrize(("model", "parameters"), MODELS)
-def test_block_means(model, parameters, size):
-    # Expected: the covariance of the block means of a dense path of single samples.
-    single, blocks = dynamics(model, parameters, 0.1), 3
-    block = single.of_blocks(size)
-    start = np.eye(len(single.reads)) + 0.5
-    paths = covariance(single, start, blocks * size + 1, single.reads)[1:, 1:]
-    mean = np.kron(np.eye(blocks), np.full(size, 1 / size))
-    whole = covariance(block, np.pad(start, (0, 1)), blocks + 1, block.reads)[1:, 1:]
-    np.testing.assert_allclose(whole, mean @ paths @ mean.T, rtol=1e-9)
-
-
-def covariance(model, start, samples, reads):
-    """Of h'x_t over the path [T, T]."""
-    spreads, found = [start], np.zeros((samples, samples))
-    for _ in range(samples - 1):
-        spreads.append(model.transition @ spreads[-1] @ model.transition.T + model.process)
-    for t, spread in enumerate(spreads):
-        column = spread @ reads
-        for later in range(t, samples):
-            found[t, later] = found[later, t] = reads @ column
-            column = model.transition @ column
-    return found
-
-
 @pytest.mark.parametrize("phi", [0.0, 0.6])
 @pytest.mark.parametrize(("model", "parameters"), MODELS)
 def test_gain_is_that_of_the_smoother(model, parameters, phi):
@@ -176,3 +150,28 @@ def test_limits_of_the_gain():
 def test_unknown_model():
     with pytest.raises(DataError, match="unknown motion model 'snap'"):
         dynamics("snap", {"q": 1.0}, 0.1)
+
+
+def test_lines_beside_a_model():
+    # Expected: of independent parts the covariances of the rate add, at every lag.
+    period, lines = 0.02, (Line(5.0, 1e-3, 2.0), Line(11.0, 1e-9, 0.5))
+    whole = Motion("markov", {"tau_s": 0.8, "sd": 2.0}, 1 / period, lines=lines).dynamics()
+    parts = [dynamics("markov", {"tau_s": 0.8, "sd": 2.0}, period)]
+    parts += [
+        dynamics(
+            "oscillator",
+            {"frequency_hz": one.frequency_hz, "damping": one.damping, "sd": one.sd, "q": 0.0},
+            period,
+        )
+        for one in lines
+    ]
+    for lag in (0, 1, 7, 60):
+        expected = sum(covariance_at(one, lag) for one in parts)
+        assert covariance_at(whole, lag) == pytest.approx(expected, rel=1e-9)
+    # x'' + 2ζωx' + ω²x = white: a sinusoid keeps its phase.
+    assert covariance_at(parts[2], 50) == pytest.approx(0.25 * math.cos(2 * math.pi * 11.0), rel=1e-5)
+
+
+def covariance_at(model, lag):
+    known = np.nan_to_num(model.stationary)
+    return float(model.reads @ np.linalg.matrix_power(model.transition, lag) @ known @ model.reads)

@@ -7,8 +7,8 @@ import pytest
 
 from vgyro.errors import DataError
 from vgyro.fusion import smoother
-from vgyro.fusion.motion_evidence import wide_start
 from vgyro.fusion.motion_models import Motion, SteadyGain, fixed_bandwidth, random_walk_keep
+from vgyro.fusion.motion_start import wide_start
 
 RATE = 20.0
 MOTIONS = [

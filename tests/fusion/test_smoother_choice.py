@@ -1,14 +1,20 @@
-"""The choice of a motion model by likelihood, on simulated rates whose truth is known."""
+"""The choice of a motion model, on simulated rates whose truth is known."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vgyro.errors import DataError, TooShort
+from vgyro.engine.native import statespace as native
+from vgyro.errors import DataError, EngineError, TooShort
+from vgyro.fusion import motion_choice
+from vgyro.fusion.motion_choice import _compared
 from vgyro.fusion.motion_evidence import gather
+from vgyro.fusion.motion_models import Motion
+from vgyro.fusion.motion_search import Fit
 from vgyro.fusion.smoother import choose_motion, smooth
 
 POLE = math.exp(-2 * math.pi * 40 / 500)
@@ -94,8 +100,7 @@ def test_sinusoid(phi):
     assert abs(math.degrees(math.atan2(quadrature, inphase))) < 0.2
     assert motion.model == "oscillator"
     assert motion.parameters["frequency_hz"] == pytest.approx(0.25, rel=0.002)
-    assert [row.model for row in motion.table] == ["random_walk", "acceleration", "jerk", "oscillator", "markov"]
-    assert min(motion.table, key=lambda row: row.bic).model == "oscillator"
+    assert motion.table[0].cost == min(row.cost for row in motion.table)
 
 
 def test_colour_is_not_taken_for_motion():
@@ -128,23 +133,19 @@ def test_few_samples_at_1_hz():
     motion = choose_motion(z, 0.05**2, one_stretch(z), 1.0)
     error = smooth(z, 0.05**2, one_stretch(z), 1.0, motion).rate - truth
     assert np.std(error) < 0.6 * 0.05
-    assert motion.table[0].samples == 300 - 16
 
 
-def test_a_long_recording_by_windows_and_block_means():
-    """Known truth: a random walk so slow that noise and rate are alike at 0.1 Hz, which a window of 4096 samples (8 s)
-    does not resolve. The mean of 4 fits is within 15 % of q: each has 1/√(800 s · ∫G² df) = 13 %, their mean 6 %."""
+def test_a_long_recording_in_pieces():
+    """Known truth: a random walk so slow that noise and rate are alike at 0.1 Hz, in 13 minutes at 500 Hz. The mean of
+    4 fits is within 15 % of q: each has 1/√(800 s · ∫G² df) = 13 %, their mean 6 %."""
     rate_hz, samples, q = 500.0, 400_000, 4.0 * (2 * math.pi * 0.1) ** 2 / 500.0
-    found, evidence = [], None
+    found = []
     for seed in range(4):
         z = np.cumsum(white(seed, samples)) * math.sqrt(q / rate_hz) + 2.0 * white(seed + 50, samples)
         motion = choose_motion(z, 4.0, one_stretch(z), rate_hz, models=("random_walk",))
-        found.append(motion.table[0].parameters["q"])
-        evidence = gather(z, np.array(4.0), one_stretch(z), rate_hz, 0.0, None)
+        found.append(motion.parameters["q"])
     assert np.mean(found) == pytest.approx(q, rel=0.15)
-    assert evidence is not None
-    assert [one.size for one in evidence.series] == [1, 1, 1, 1, 49]
-    assert sum(len(one.z) for one in evidence.series) < 25_000
+    assert [len(one.z) for one in gather(z, 4.0, one_stretch(z), rate_hz, 0.0, None)] == [200_000, 200_000]
 
 
 def test_only_moving_samples_count():
@@ -159,31 +160,54 @@ def test_only_moving_samples_count():
     assert (whole.model, whole.parameters) == (alone.model, alone.parameters)
 
 
-def test_what_smooths_best_is_not_what_is_most_likely():
-    """Known truth: band-limited motion, of which a jerk model's likelihood smooths too little.
-
-    The tuned smoother's error is at least 5 % less in the mean of 4 tries.
-    """
+def test_what_smooths_best_is_found():
+    """Known truth: band-limited motion, which no jerk is. The true error of the smoother is at most 2 % above the least
+    that any q gives, in the mean of 4 tries."""
     ratios = []
     for seed in range(4):
         truth = band_limited(seed, 12000, 100.0, 20.0, 0.5)
         z = truth + white(seed + 50, 12000)
         motion = choose_motion(z, 1.0, one_stretch(z), 100.0, models=("jerk",))
-        likely = replace(motion, parameters=motion.table[0].parameters)
-        errors = [np.std(smooth(z, 1.0, one_stretch(z), 100.0, one).rate - truth) for one in (motion, likely)]
-        ratios.append(errors[0] / errors[1])
-    assert np.mean(ratios) < 0.95
+        others = [replace(motion, parameters={"q": motion.parameters["q"] * 2.0**k}) for k in range(-4, 5)]
+        errors = [np.std(smooth(z, 1.0, one_stretch(z), 100.0, one).rate - truth) for one in (motion, *others)]
+        ratios.append(errors[0] / min(errors))
+    assert np.mean(ratios) < 1.02
 
 
-def test_the_reference_engine_gives_the_same_table():
-    # Expected: filterpy's log-likelihoods of the same parameters.
-    z = np.cumsum(white(4, 300)) * 0.1 + white(5, 300)
-    ours, theirs = (
-        choose_motion(z, 1.0, one_stretch(z), 10.0, 0.3, ("random_walk", "markov"), engine=which)
-        for which in ("native", "reference")
-    )
-    assert [row.log_likelihood for row in theirs.table] == pytest.approx([row.log_likelihood for row in ours.table])
-    assert theirs.parameters == ours.parameters
+BROKEN = {"frequency_hz": 0.03995, "damping": 6.57, "second_hz": 1.603, "second_damping": 100.09, "sd": 1129.0}
+
+
+def test_a_model_that_breaks_down_is_left_out(monkeypatch):
+    # Expected: of two fits the better one cannot be smoothed with; the other is taken.
+    z = np.cumsum(white(4, 3000)) * 0.1 + white(5, 3000)
+    bad = Fit("pair", BROKEN, (), np.ones(1), -1e9, 0.0)
+
+    def compared(*arguments):
+        found = _compared(*arguments)
+        return replace(found, fits=[replace(bad, signal=found.fits[0].signal), *found.fits])
+
+    own = native.smooth
+
+    def smoothing(z, r, model, *regime):
+        if len(model.reads) == 4:
+            raise EngineError("the smoothed rate is not finite")
+        return own(z, r, model, *regime)
+
+    monkeypatch.setattr(motion_choice, "_compared", compared)
+    monkeypatch.setattr(native, "smooth", smoothing)
+    motion = choose_motion(z, 1.0, one_stretch(z), 50.0)
+    assert motion.table[0].parameters == BROKEN
+    assert motion.parameters == motion.table[1].parameters
+
+
+@pytest.mark.parametrize("r", [1e-3, 1e-12])
+def test_parameters_that_broke_the_smoother(r):
+    # Expected: a finite rate, or an error that is caught; never one that ends the job.
+    z = 1e3 * np.cumsum(white(4, 3000))
+    with suppress(EngineError, DataError):
+        smoothed = smooth(z, r, one_stretch(z), 50.0, Motion("oscillator", BROKEN, 50.0))
+        assert np.isfinite(smoothed.rate).all()
+    assert choose_motion(z, r, one_stretch(z), 50.0) is not None
 
 
 def test_gaps_and_samples_that_say_nothing():

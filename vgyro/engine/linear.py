@@ -9,7 +9,7 @@ import numpy as np
 from vgyro.engine.finite import refuse_broken
 from vgyro.errors import DataError, EngineError
 
-MOST_STATES = 5
+MOST_STATES = 11
 """With the state that coloured noise needs."""
 
 

@@ -13,8 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vgyro.fusion.motion_choice import NARROW
-from vgyro.fusion.motion_models import UNLIMITED, Activity, Motion
+from vgyro.fusion.motion_models import NARROW, UNLIMITED, Activity, Motion
 from vgyro.fusion.smoother import smooth, stretches
 
 BLOCK_S, LEAST_BLOCK = 0.25, 8

@@ -1,50 +1,58 @@
-"""Which model of the rate, with which parameters: by maximum likelihood, then by the error of the smoother itself.
+"""Which model of the rate, with which parameters: those of the smoother with the least estimated error.
 
-The likelihood is the score of a filter: each sample given those before it. A rate is of no model exactly, and then the
-parameters that filter best are not those that smooth best: of motion limited to a band they smooth too little. So the
-models that are most likely are tuned, and compared, by an unbiased estimate of the smoother's squared error.
+A rate is of no model exactly, and then the parameters of the greatest likelihood, which is the score of a filter, are
+not those that smooth best: of motion limited to a band they smooth too little. So the smoother's own squared error is
+what is compared, by an unbiased estimate (Stein 1981, Ann. Statist. 9, 1135-1151), plus PRICE for each parameter; that
+is the one rule by which models, lines, no motion and no smoothing are chosen. The error of the steady smoother is in
+closed form in the spectrum of the fused rate (vgyro.fusion.motion_evidence).
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro import engine as engines
 from vgyro.config import MOTION_MODELS
-from vgyro.errors import DataError
+from vgyro.engine.linear import StateSpace
+from vgyro.errors import DataError, EngineError
 from vgyro.fusion.motion_calibration import calibration
-from vgyro.fusion.motion_evidence import Evidence, gather
-from vgyro.fusion.motion_models import Likelihood, Motion
+from vgyro.fusion.motion_evidence import Piece, Spectrum, gather, spectrum
+from vgyro.fusion.motion_lines import fine_bands, peak, single, sinusoid, without_peaks
+from vgyro.fusion.motion_models import UNLIMITED, Candidate, Line, Motion
+from vgyro.fusion.motion_search import PRICE, Fit, crossing_of, line_price, refine, search, signal_of, still
+from vgyro.fusion.motion_start import wide_start
 
-NO_GAIN = 0.01
-"""A motion that raises the log-likelihood by less is none."""
-GRID = 0.35
-"""Step of the first search over the frequency at which rate and noise are alike, decades."""
-TRIES = 200
-"""Evaluations of the likelihood of one search over several parameters."""
-HIGHEST_DAMPING = 20.0
-HIGHEST = 0.2
-"""Frequency of an oscillation over the sample rate: what is faster is the noise's own colour."""
-FINALISTS = 2
-NEAR = {"q": 1e4, "tau_s": 1e3, "sd": 1e2, "frequency_hz": 3.0, "second_hz": 3.0, "damping": 1e4, "second_damping": 1e4}
-"""How far from the most likely parameters those that smooth best are looked for, as a factor either way."""
-FIRST_STEP = {"q": -1.5, "tau_s": 0.5, "sd": -0.3, "frequency_hz": 0.1, "second_hz": 0.1}
-NARROW = 1e-4
-"""Damping of an oscillation that is a sinusoid: no second oscillator drives it."""
-FLAT = {
-    "frequency_hz": (0.63, "frequency_hz"), "damping": (0.3, ""), "second_hz": (1.48, "frequency_hz"),
-    "second_damping": (0.04, ""), "sd": (1.0, "sd"),
-}  # fmt: skip
-"""Two oscillators that fit a flat band best, in units of what the best single one has."""
-CERTAIN = 100.0
-"""Log-likelihood over that of a constant rate from which on a second oscillator is worth a search."""
-STRONG = 8.0
-"""Lines of a periodogram that are certainly not noise, over its density."""
+DRIVEN = ("random_walk", "acceleration", "jerk")
+MOST_LINES = 3
+AROUND = 1.2
+"""Whether a line has a width is seen from the spectrum within this factor of its frequency."""
+SPENT = 4.0
+"""Risk of the amplitude and the phase of a sinusoid, both passed as they are."""
+CHECKED = 1 << 14
+"""Samples on which the smoother itself is tried."""
 
-Parameters = dict[str, float]
+
+@dataclass(frozen=True)
+class Compared:
+    """Models compared on the pieces of a recording without the sinusoids that were taken out of them.
+
+    whole : all lines of the periodograms;  bands : of them, on which the fits were made
+    fits  : in order of their cost;  spent : cost of the sinusoids
+    """
+
+    pieces: list[Piece]
+    sinusoids: tuple[Line, ...]
+    whole: Spectrum
+    bands: Spectrum
+    fits: list[Fit]
+    spent: float
+
+    @property
+    def cost(self) -> float:
+        return self.fits[0].cost + self.spent
 
 
 def choose_motion(
@@ -57,193 +65,121 @@ def choose_motion(
     engine: str = "native",
     moving: np.ndarray | None = None,
 ) -> Motion:
-    """The model of the rate that smooths best, of those that are most likely.
+    """The model of the rate whose smoother has the least estimated error.
 
     z, r, segment, rate_hz, phi : as in vgyro.fusion.smoother.smooth;  moving : [T] bool, only these samples count
     models : names of those to choose from
-    Each model has the parameters of its greatest likelihood. Of the FINALISTS of smallest BIC the parameters are then
-    tuned to the smallest estimated error, in units of the noise, and the model of the smallest
-    error + (parameters)·ln(samples) is taken; in doubt, by less than ln(samples), the most likely one. A constant rate
-    is a legal answer: q = 0.
-    Of more than 2^14 samples, four windows of 2^12 samples spread over the recording are used, and means of blocks of
-    the whole of it, about 2^13, whose model is exact (but for the correlation of coloured noise between blocks); their
-    scores are added. The likelihood is that given the first 16 samples of each stretch: no model pays for not knowing
-    where it starts. The search is the native engine's; another one gives the log-likelihoods of the table.
+    A constant rate is a legal answer, q = 0, and so is no smoothing, `none`. Lines that stand in the spectrum of z are
+    motion: sinusoids, or with a width. A model whose smoother breaks down is left out.
     raises : DataError if the samples do not change, or if r is not above zero; TooShort
     """
-    evidence = gather(z, r, segment, rate_hz, phi, moving)
-    fits = sorted((_row(model, _FITS[model](evidence), evidence) for model in models), key=lambda row: row.bic)
-    finalists = [_tuned(row, evidence) for row in fits[:FINALISTS]]
-    rows = {row.model: row for row in fits[FINALISTS:] + finalists}
-    if engine != evidence.engine:
-        rows = {name: _checked(row, evidence, engine) for name, row in rows.items()}
-    table = tuple(rows[model] for model in models)
-    doubt = math.log(fits[0].samples)
-    for best in sorted(finalists, key=lambda row: row.risk + _penalty(row) + doubt * (row.model != fits[0].model)):
-        motion = Motion(best.model, best.tuned, rate_hz, table)
-        factor = calibration(motion, evidence)
-        if math.isfinite(best.risk) and factor is not None:
-            return replace(motion, calibration=factor)
-    raise DataError("no motion model fits: every smoother breaks down", remedy="look for outliers in rate and noise")
+    found = _best(gather(z, r, segment, rate_hz, phi, moving), rate_hz, _families(models))
+    rows = tuple(
+        Candidate(*_named(fit, found.sinusoids, models), fit.risk + found.spent, fit.cost + found.spent)
+        for fit in found.fits
+    )
+    z, r, free = np.asarray(z, dtype=float), np.asarray(r, dtype=float), float(found.bands.weight.sum())
+    for fit, row in zip(found.fits, rows, strict=True):
+        motion = Motion(row.model, row.parameters, rate_hz, rows, calibration(found.bands, fit.signal), row.lines)
+        if row.cost < free and _stands(motion, z, r, phi, found.pieces, engine):
+            return motion
+    return Motion(UNLIMITED, {}, rate_hz, rows)
 
 
-def _row(model: str, parameters: Parameters, evidence: Evidence, engine: str = "") -> Likelihood:
-    total, count = evidence.log_likelihood(model, parameters, engine)
-    row = Likelihood(model, total, math.inf, parameters, count)
-    return replace(row, bic=_penalty(row) - 2.0 * total)
+def _named(
+    fit: Fit, sinusoids: tuple[Line, ...], models: Sequence[str]
+) -> tuple[str, dict[str, float], tuple[Line, ...]]:
+    """Model, parameters and lines of Motion: a single oscillation of a rate that is constant is an oscillator."""
+    lines = (*sinusoids, *fit.lines)
+    if fit.family:
+        model = "oscillator" if fit.family in ("resonance", "pair") else fit.family
+        return model, dict(fit.values) | ({"q": 0.0} if fit.family == "resonance" else {}), lines
+    if len(lines) == 1 and "oscillator" in models:
+        one = lines[0]
+        return "oscillator", {"frequency_hz": one.frequency_hz, "damping": one.damping, "sd": one.sd, "q": 0.0}, ()
+    return "random_walk", {"q": 0.0}, lines
 
 
-def _penalty(row: Likelihood) -> float:
-    # The frequency counts twice: it is the best of as many lines as there are samples.
-    free = len(row.parameters) + ("frequency_hz" in row.parameters) - (row.parameters.get("q") == 0.0)
-    return free * math.log(row.samples)
+def _families(models: Sequence[str]) -> list[str]:
+    unknown = set(models) - set(MOTION_MODELS)
+    if unknown:
+        raise DataError(f"unknown motion model {min(unknown)!r}", remedy=f"Known: {', '.join(MOTION_MODELS)}")
+    return [one for model in models for one in (("resonance", "pair") if model == "oscillator" else (model,))]
 
 
-def _checked(row: Likelihood, evidence: Evidence, engine: str) -> Likelihood:
-    again = _row(row.model, dict(row.parameters), evidence, engine)
-    return replace(row, log_likelihood=again.log_likelihood, bic=again.bic)
+def _best(pieces: list[Piece], rate_hz: float, families: Sequence[str]) -> Compared:
+    """With lines and without. Lines are looked for beside the motion that the spectrum without peaks has: other models
+    take a line for a part of themselves."""
+    plain = _compared(pieces, (), (), rate_hz, families)
+    bare = still(plain.bands) if single(plain.whole) else _bare(plain.bands)
+    here, whole = pieces, plain.whole
+    lines: tuple[Line, ...] = ()
+    sinusoids: tuple[Line, ...] = ()
+    for _ in range(MOST_LINES):
+        there = peak(whole, signal_of(whole, bare, lines))
+        if there.gain < line_price(whole):
+            break
+        around = there.frequency_hz / AROUND, there.frequency_hz * AROUND
+        near = fine_bands(whole.between(*around), [there.frequency_hz])
+        others = signal_of(near, bare, lines)
+        wide = refine(near, "", np.empty(0), (there.line(),), others)
+        if there.sharp:
+            line, left = sinusoid(here, rate_hz, there.frequency_hz)
+            without = spectrum(left, rate_hz)
+            risk = float(fine_bands(without.between(*around), [there.frequency_hz]).risk(others))
+            if risk + _spent((line,), without) < wide.risk + line_price(whole):
+                here, whole, sinusoids = left, without, (*sinusoids, line)
+                continue
+        lines = (*lines, *wide.lines)
+    if not lines and not sinusoids:
+        return plain
+    found = _compared(here, sinusoids, lines, rate_hz, families)
+    return min(plain, found, key=lambda one: one.cost)
 
 
-def _tuned(row: Likelihood, evidence: Evidence) -> Likelihood:
-    """With the smallest error, near the parameters of the greatest likelihood. A sinusoid stays as it is."""
-    start = {name: value for name, value in row.parameters.items() if value > 0.0}
-    best = dict(row.parameters)
-    if start and row.parameters.get("damping", 1.0) > NARROW:
-        bounds = {name: (value / NEAR[name], value * NEAR[name]) for name, value in start.items()}
-        fixed = {name: value for name, value in row.parameters.items() if name not in start}
-
-        def score(parameters: Parameters) -> float:
-            return -0.5 * evidence.risk(row.model, parameters)
-
-        found = _search(score, [start], bounds, fixed, FIRST_STEP)
-        best = found if score(found) > score(best) else best
-    return replace(row, risk=evidence.risk(row.model, best), tuned=best)
+def _bare(bands: Spectrum) -> Fit:
+    """The motion without lines, about."""
+    smooth = without_peaks(bands)
+    return min((search(smooth, family, (), 0.0) for family in DRIVEN), key=lambda fit: fit.cost)
 
 
-def _driven(model: str, order: int) -> Callable[[Evidence], Parameters]:
-    """Fit of a rate whose derivative of this order is white: a grid over the frequency f at which rate and noise have
-    the same density, q = N²·(2π·f)^(2·order), then Brent's search between its best neighbours."""
-
-    def fit(evidence: Evidence) -> Parameters:
-        from scipy.optimize import minimize_scalar
-
-        def parameters(log: float) -> Parameters:
-            return {"q": evidence.noise_density * (2.0 * math.pi * math.exp(log)) ** (2 * order)}
-
-        def cost(log: float) -> float:
-            return -evidence.log_likelihood(model, parameters(log))[0]
-
-        lowest, highest = math.log(0.03 / evidence.duration_s), math.log(evidence.rate_hz)
-        grid = np.linspace(lowest, highest, math.ceil((highest - lowest) / (GRID * math.log(10.0))) + 1)
-        costs = [cost(log) for log in grid.tolist()]
-        best = int(np.argmin(costs))
-        bounds = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)]))
-        found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-3})
-        still = -evidence.log_likelihood(model, {"q": 0.0})[0]
-        return {"q": 0.0} if still <= found.fun + NO_GAIN else parameters(float(found.x))
-
-    return fit
+def _compared(
+    pieces: list[Piece], sinusoids: tuple[Line, ...], lines: tuple[Line, ...], rate_hz: float, families: Sequence[str]
+) -> Compared:
+    whole = spectrum(pieces, rate_hz)
+    bands = fine_bands(whole, [line.frequency_hz for line in lines])
+    fits = [still(bands, lines)]
+    if lines:
+        fits.append(refine(bands, "", np.empty(0), lines))
+    fits += [search(bands, family, lines, 0.0) for family in DRIVEN]
+    crossing = crossing_of(bands, min(fits, key=lambda fit: fit.cost).signal)
+    fits += [search(bands, family, lines, crossing) for family in families if family not in DRIVEN]
+    fits = [fit for fit in fits if not fit.family or fit.family in families]
+    return Compared(pieces, sinusoids, whole, bands, sorted(fits, key=lambda fit: fit.cost), _spent(sinusoids, whole))
 
 
-def _markov(evidence: Evidence) -> Parameters:
-    """Starts at the random walk q = 2·sd²/τ with the variance that the rate has beside its noise."""
-    q = _FITS["random_walk"](evidence)["q"]
-    sd = math.sqrt(evidence.excess)
-    tau = 2.0 * sd**2 / q if q > 0 else 0.1 * evidence.duration_s
-
-    def likelihood(parameters: Parameters) -> float:
-        return evidence.log_likelihood("markov", parameters)[0]
-
-    bounds = {"tau_s": (0.1 / evidence.rate_hz, 1e4 * evidence.duration_s), "sd": (1e-6 * sd, 1e6 * sd)}
-    return _search(likelihood, [{"tau_s": tau, "sd": sd}], bounds, {}, {})
+def _spent(sinusoids: tuple[Line, ...], whole: Spectrum) -> float:
+    """Of each its frequency; in each piece its amplitude and phase, which count as one line of the periodogram."""
+    share = 0.5 * float(np.mean(whole.weight)) * whole.pieces
+    return len(sinusoids) * (line_price(whole) - 2.0 * PRICE + SPENT * share)
 
 
-def _oscillator(evidence: Evidence) -> Parameters:
-    """About a constant; then, each where it is worth its parameters, about a random walk, and driven by another one.
-
-    Starts narrow at the highest line of the periodogram, and wide at the r.m.s. frequency of the rate.
-    """
-    line, centre = _frequencies(evidence)
-    sd, fastest = math.sqrt(evidence.excess), HIGHEST * evidence.rate_hz
-    hertz, losses = (0.01 / evidence.duration_s, fastest), (1e-9, HIGHEST_DAMPING)
-    bounds = {"frequency_hz": hertz, "damping": losses, "sd": (1e-6 * sd, 1e6 * sd)}
-    starts = [{"frequency_hz": line, "damping": 0.02, "sd": sd}, {"frequency_hz": centre, "damping": 0.5, "sd": sd}]
-
-    def likelihood(parameters: Parameters) -> float:
-        return evidence.log_likelihood("oscillator", parameters)[0]
-
-    found = [_search(likelihood, starts, bounds, {"q": 0.0}, {})]
-    slow = evidence.noise_density * (2.0 * math.pi * min(0.1 * found[0]["frequency_hz"], 1.0)) ** 2
-    wider = bounds | {"q": (1e-12 * slow, 1e6 * slow)}
-    found.append(_search(likelihood, [found[0] | {"q": slow}], wider, {}, {}))
-    still = evidence.log_likelihood("random_walk", {"q": 0.0})[0]
-    certain = likelihood(found[0]) - still > CERTAIN
-    if certain and NARROW < found[0]["damping"] < 1.0:
-        start = {name: value * found[0].get(of, 1.0) for name, (value, of) in FLAT.items()}
-        near = (0.1 * found[0]["frequency_hz"], min(10.0 * found[0]["frequency_hz"], fastest))
-        wider = bounds | dict.fromkeys(("frequency_hz", "second_hz"), near)
-        wider |= dict.fromkeys(("damping", "second_damping"), (1e-3, 2.0))
-        found.append(_search(likelihood, [start], wider, {}, {}))
-    return min(found, key=lambda parameters: _row("oscillator", parameters, evidence).bic)
-
-
-def _search(
-    score: Callable[[Parameters], float],
-    starts: list[Parameters],
-    bounds: Mapping[str, tuple[float, float]],
-    fixed: Parameters,
-    first_step: Mapping[str, float],
-) -> Parameters:
-    """Greatest score over the logarithms of the parameters, by Nelder & Mead from each start, then again from the best
-    place."""
-    from scipy.optimize import minimize
-
-    names = list(bounds)
-    lowest, highest = np.log(np.array([bounds[name] for name in names])).T
-    steps = np.diag([first_step.get(name, 0.7) for name in names])
-
-    def parameters(logs: np.ndarray) -> Parameters:
-        return dict(zip(names, np.exp(np.clip(logs, lowest, highest)).tolist(), strict=True)) | fixed
-
-    def cost(logs: np.ndarray) -> float:
-        outside = float(np.sum(np.maximum(lowest - logs, 0.0) + np.maximum(logs - highest, 0.0)))
-        return -score(parameters(logs)) + 1e3 * outside
-
-    def run(start: np.ndarray, size: float) -> tuple[float, np.ndarray]:
-        simplex = np.vstack([start, start + size * steps])
-        options = {"initial_simplex": simplex, "maxfev": TRIES, "xatol": 0.02, "fatol": NO_GAIN}
-        found = minimize(cost, start, method="Nelder-Mead", options=options)
-        return float(found.fun), found.x
-
-    logs = [np.clip(np.log([start[name] for name in names]), lowest, highest) for start in starts]
-    value, place = min((run(one, 1.0) for one in logs), key=lambda found: found[0])
-    again, other = run(place, -0.4)
-    return parameters(other if again < value else place)
-
-
-def _frequencies(evidence: Evidence) -> tuple[float, float]:
-    """Highest line of the periodograms, and r.m.s. frequency of the lines above the noise, Hz."""
-    best, moments = (0.0, 1.0 / evidence.duration_s), np.zeros(2)
-    for one in evidence.series:
-        told = np.isfinite(one.r)
-        mean = float(np.mean(one.z[told]))
-        window = np.hanning(len(one.z))
-        power = np.abs(np.fft.rfft(np.where(told, one.z - mean, 0.0) * window)) ** 2
-        frequency = np.fft.rfftfreq(len(one.z), one.size / evidence.rate_hz)
-        # Of white noise alone, and of the sum over a line of amplitude A, A²/4·(Σ window)²
-        noise = float(np.mean(one.r[told])) * float(np.sum(window**2))
-        power, frequency = np.where(power > STRONG * noise, power, 0.0)[1:-1], frequency[1:-1]
-        moments += [float(np.sum(power * frequency**2)) / noise, float(np.sum(power)) / noise]
-        highest = int(np.argmax(power))
-        best = max(best, (float(power[highest]) / float(np.sum(window)) ** 2, float(frequency[highest])))
-    centre = math.sqrt(moments[0] / moments[1]) if moments[1] > 0 and moments[0] > 0 else best[1]
-    return best[1], centre
-
-
-_FITS: dict[str, Callable[[Evidence], Parameters]] = {
-    "random_walk": _driven("random_walk", 1),
-    "acceleration": _driven("acceleration", 2),
-    "jerk": _driven("jerk", 3),
-    "oscillator": _oscillator,
-    "markov": _markov,
-}
+def _stands(motion: Motion, z: np.ndarray, r: np.ndarray, phi: float, pieces: list[Piece], engine: str) -> bool:
+    """The smoother itself does not break down on the longest piece, and its estimated risk is below no smoothing's."""
+    longest = max(pieces, key=lambda piece: len(piece.z))
+    part = slice(longest.start, longest.start + min(len(longest.z), CHECKED))
+    own, noise, model = z[part], r if r.ndim == 0 else r[part], motion.dynamics()
+    start = wide_start(own, noise, model)
+    if start is None:
+        return False
+    space = StateSpace(model.transition, model.process, model.reads, model.reads, *start, pole=phi)
+    try:
+        smoothed, variance = engines.get(engine).statespace.smooth(own, noise, space)
+    except EngineError:
+        return False
+    noise = np.broadcast_to(noise, own.shape)
+    told = np.isfinite(noise)
+    if not np.all(variance > 0.0):
+        return False
+    left = (own[told] - smoothed[told]) ** 2 + 2.0 * variance[told]
+    return bool(float(np.mean(left / noise[told])) < 2.0)

@@ -1,225 +1,202 @@
-"""What models of the rate are compared on: stretches of a recording, and their likelihood."""
+"""What models of the rate are compared on: the spectrum of the fused rate, and that of its noise."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from vgyro import engine as engines
-from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError, TooShort
-from vgyro.fusion.motion_models import Dynamics, dynamics
 
-MOST_SAMPLES = 1 << 14
-"""A recording of no more samples is used as it is. Of a longer one: windows at its full rate, and block means."""
-WINDOWS, WINDOW = 4, 1 << 12
-BLOCKS = 1 << 13
-RUNS = 16
-"""The most gap-free stretches that are used, the longest ones."""
+LONGEST = 1 << 18
+"""A stretch is cut into pieces of no more samples."""
+MOST, MOST_SAMPLES = 128, 1 << 22
+"""Pieces, and samples of all, that are used at most."""
 SHORTEST = 32
-SKIP = 16
-"""First samples of each stretch that are given, not predicted: the same for every model, wherever it starts."""
-WIDE = 1e5
-"""Variance of a start that counts as knowing nothing, over that of the noise."""
+"""Samples of a piece at least."""
+FILLED = 16
+"""So many samples in a row that say nothing are filled in by a straight line; more of them end a piece."""
+PER_OCTAVE = 24
+"""Bands of the spectrum in a factor of two: each as wide as 3 % of its frequency, or one line of the periodogram."""
 
 
 @dataclass(frozen=True)
-class Series:
-    """A gap-free stretch of samples, or of means of `size` of them.
+class Spectrum:
+    """Periodograms of all pieces, each line or means over bands. Arrays [F], frequency above 0 and below half the rate.
 
-    z, r : [T], deg/s and (deg/s)²;  phi : of the noise;  shrink : r over the mean variance of the samples
+    frequency : Hz, rising;  power, noise : densities of z and of its noise, two-sided, deg²/s
+    weight    : how many independent values the power is the mean of, of one degree of freedom each
+    rate_hz   : of the samples;  pieces : how many
     """
 
-    z: np.ndarray
-    r: np.ndarray
-    size: int = 1
-    phi: float = 0.0
-    shrink: float = 1.0
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What the models are compared on.
-
-    noise_density : of the noise at low frequency, deg²/s;  duration_s : from the first sample to the last
-    excess        : variance of the rate beside its noise, (deg/s)², at least a little
-    """
-
-    series: list[Series]
+    frequency: np.ndarray
+    power: np.ndarray
+    noise: np.ndarray
+    weight: np.ndarray
     rate_hz: float
-    noise_density: float
-    duration_s: float
-    excess: float
-    phi: float
-    engine: str = "native"
+    pieces: int
 
-    def log_likelihood(self, model: str, parameters: Mapping[str, float], engine: str = "") -> tuple[float, int]:
-        """Summed over the series, and the number of samples that were predicted; -inf where a model breaks down."""
-        run = engines.get(engine or self.engine).statespace.log_likelihood
-        total, count = self._sum(
-            model, parameters, lambda one, space: run(one.z, one.r, space, min(SKIP, len(one.z) // 4))
-        )
-        return (total if math.isfinite(total) else -math.inf), count
+    def risk(self, signal: np.ndarray) -> np.ndarray:
+        """Unbiased estimate of the squared error of the smoother H = S/(S + S_v), in units of the noise, summed.
 
-    def risk(self, model: str, parameters: Mapping[str, float]) -> float:
-        """Unbiased estimate of the smoother's squared error, in units of the noise at low frequency, summed, but for a
-        constant; infinite where a model breaks down.
-
-        E(ŵ - w)² = E(z - ŵ)² - r + 2·cov(ŵ, v), and the covariance is the variance P that the smoother claims, whatever
-        the rate does and whatever the noise's colour is. Stein (1981), Ann. Statist. 9, 1135-1151.
+        signal : S [..., F], of the model, deg²/s
+        The smoother leaves (1 - H)·z, and H·S_v of noise and rate are common to both: the error has the density
+        (1 - H)²·S_z + (2H - 1)·S_v, whatever the rate does. Stein (1981), Ann. Statist. 9, 1135-1151.
         """
-        run = engines.get(self.engine).statespace.smooth
+        H = signal / (signal + self.noise)
+        found: np.ndarray = ((1.0 - H) ** 2 * (self.power / self.noise) + 2.0 * H - 1.0) @ self.weight
+        return found
 
-        def of(one: Series, space: StateSpace) -> tuple[float, int]:
-            smoothed, variance = run(one.z, one.r, space)
-            told = np.isfinite(one.r)
-            if not np.all(variance > 0.0):
-                return math.inf, 0
-            squares = (one.z[told] - smoothed[told]) ** 2 + 2.0 * variance[told]
-            return float(np.sum(squares / one.r[told])) * (1.0 - one.phi) / (1.0 + one.phi), 0
+    def between(self, low: float, high: float) -> Spectrum:
+        """The lines of these frequencies, Hz."""
+        part = slice(*np.searchsorted(self.frequency, [low, high]).tolist())
+        arrays = {name: getattr(self, name)[part] for name in ("frequency", "power", "noise", "weight")}
+        return replace(self, **arrays)
 
-        return self._sum(model, parameters, of)[0]
+    def bands(self) -> Spectrum:
+        """Means over bands of equal width on the logarithm of the frequency, where they hold more than one line."""
+        place = np.floor(np.log2(self.frequency / self.frequency[0]) * PER_OCTAVE)
+        return self.merged(np.flatnonzero(np.diff(place, prepend=-1.0)))
 
-    def _sum(
-        self, model: str, parameters: Mapping[str, float], run: Callable[[Series, StateSpace], tuple[float, int]]
-    ) -> tuple[float, int]:
-        total, count = 0.0, 0
-        single = dynamics(model, parameters, 1.0 / self.rate_hz)
-        blocks = {size: single.of_blocks(size) for size in {one.size for one in self.series} if size > 1}
-        for one in self.series:
-            own = blocks.get(one.size, single)
-            start = wide_start(one.z, one.r, own, one.size)
-            if start is None:
-                continue
-            space = StateSpace(own.transition, own.process, own.reads, own.reads, *start, pole=one.phi)
-            score, terms = run(one, space)
-            total, count = total + score, count + terms
-        return total, count
+    def merged(self, first: np.ndarray) -> Spectrum:
+        """Weighted means over the lines from each of `first` [F'] to the next."""
+        total = np.add.reduceat(self.weight, first)
+        means = [np.add.reduceat(self.weight * one, first) / total for one in (self.frequency, self.power, self.noise)]
+        return Spectrum(means[0], means[1], means[2], total, self.rate_hz, self.pieces)
 
 
-def wide_start(z: np.ndarray, r: np.ndarray, model: Dynamics, size: int = 1) -> tuple[np.ndarray, np.ndarray] | None:
-    """Mean [n] and covariance [n, n] of the state at the first sample; None where no sample says anything.
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of samples without a gap.
 
-    States that have a variance start with it about zero; the others at the first sample that says something, with WIDE
-    times the variance of the noise and 100 times that of the steps.
-    size : of the blocks whose mean is read, with a model of blocks
+    start : its first sample;  z : [T], deg/s, without its mean under the taper, filled where it says nothing
+    taper : [T];  noise : density [F] of the noise at the lines of the periodogram, deg²/s
     """
-    told = np.flatnonzero(np.isfinite(r[:SKIP])) if r.ndim else np.zeros(1, dtype=int)
-    if told.size == 0:
-        told = np.flatnonzero(np.isfinite(r))[:SKIP]
-    if told.size == 0:
-        return None
-    noise = float(np.max(r[told])) if r.ndim else float(r)
-    inside = z[: 1 << 12] if r.ndim == 0 else z[np.isfinite(r[: 1 << 12]).nonzero()[0]]
-    step = float(np.mean(np.diff(inside) ** 2)) if len(inside) > 1 else 0.0
-    wide = (WIDE * noise + 100.0 * step) / float(size) ** (2.0 * model.order)
-    states = len(model.reads)
-    wanders = np.isnan(np.diagonal(model.stationary))
-    spread = np.where(np.diag(wanders), np.diag(wide), model.stationary)
-    start = np.zeros(states)
-    start[np.flatnonzero(wanders & (model.order == 0))[:1]] = z[told[0]]
-    if size > 1:
-        start, spread = model.transition @ start, model.transition @ spread @ model.transition.T + model.process
-    return start, spread
+
+    start: int
+    z: np.ndarray
+    taper: np.ndarray
+    noise: np.ndarray
+
+    def lines(self, rate_hz: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Frequency, density of z, and weight of each line [F]."""
+        from scipy.fft import rfft
+
+        squares = np.square(self.taper)
+        total = float(squares.sum())
+        power = np.abs(rfft(self.z * self.taper)[1:][: len(self.noise)]) ** 2 / (total * rate_hz)
+        weight = 2.0 * total**2 / float(np.square(squares).sum()) / len(self.z)
+        return _frequencies(len(self.z), rate_hz), power, np.full(len(power), weight)
+
+
+def spectrum(pieces: list[Piece], rate_hz: float) -> Spectrum:
+    """All lines of all pieces."""
+    parts = [piece.lines(rate_hz) for piece in pieces]
+    frequency, power, weight = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    noise = np.concatenate([piece.noise for piece in pieces])
+    if len(pieces) == 1:
+        return Spectrum(frequency, power, noise, weight, rate_hz, 1)
+    order = np.argsort(frequency, kind="stable")
+    return Spectrum(frequency[order], power[order], noise[order], weight[order], rate_hz, len(pieces))
 
 
 def gather(
-    z: np.ndarray,
-    r: float | np.ndarray,
-    segment: np.ndarray,
-    rate_hz: float,
-    phi: float,
-    moving: np.ndarray | None,
-) -> Evidence:
-    """The stretches of a recording on which models are compared."""
+    z: np.ndarray, r: float | np.ndarray, segment: np.ndarray, rate_hz: float, phi: float, moving: np.ndarray | None
+) -> list[Piece]:
+    """The pieces of a recording on which models are compared.  raises : DataError, TooShort"""
     z, r = np.asarray(z, dtype=float), np.asarray(r, dtype=float)
-    runs = _runs(segment, moving, len(z))
+    told = np.broadcast_to(np.isfinite(r), z.shape)
+    runs = _runs(segment, moving, told)
     total = sum(stop - start for start, stop in runs)
     if total < SHORTEST:
-        raise TooShort(f"{total} samples in stretches of {SHORTEST} or more", remedy="a longer recording is needed")
-    _refuse(r, runs)
-    if total <= MOST_SAMPLES:
-        series = [_piece(z, r, run, phi) for run in runs]
-    else:
-        size = max(-(-total // BLOCKS), math.ceil(20.0 / (1.0 - phi)) if phi else 2)
-        series = [_piece(z, r, run, phi) for run in _windows(runs, total)]
-        series += [_means(z, r, run, size, phi) for run in runs if run[1] - run[0] >= SHORTEST * size]
-    told = [one for one in series if _told(one) >= SHORTEST]
-    if not told:
-        raise TooShort(f"fewer than {SHORTEST} samples that say anything in every stretch")
-    values = np.concatenate([one.z[np.isfinite(one.r)] for one in told])
-    noises = np.concatenate([one.r[np.isfinite(one.r)] for one in told])
-    if np.all(values == values[0]):
-        raise DataError(f"the rate is {values[0]:g} deg/s at every sample: no gyro", remedy="look at the recording")
-    density = float(np.median(noises / np.repeat([one.shrink for one in told], [_told(one) for one in told])))
-    density *= (1.0 + phi) / (1.0 - phi) / rate_hz
-    excess = max(float(np.var(values)) - float(np.mean(noises)), 1e-3 * density * rate_hz / math.sqrt(total))
-    return Evidence(told, rate_hz, density, total / rate_hz, excess, phi)
-
-
-def _told(one: Series) -> int:
-    return int(np.isfinite(one.r).sum())
-
-
-def _refuse(r: np.ndarray, runs: list[tuple[int, int]]) -> None:
+        raise TooShort(f"{total} samples that say anything in stretches of {SHORTEST} or more", remedy="record longer")
     for start, stop in runs:
         usable = (r if r.ndim == 0 else r[start:stop]) > 0
         if not np.all(usable):
-            raise DataError(
-                "the variance of the noise is not above zero",
-                f"sample {start + int(np.argmin(usable))}",
-                "look for gyros that are stuck, or copies of each other",
-            )
+            place = f"sample {start + int(np.argmin(usable))}"
+            remedy = "look for gyros that are stuck, or copies of each other"
+            raise DataError("the variance of the noise is not above zero", place, remedy)
+    value = z[runs[0][0]]
+    if all(np.all((z[start:stop] == value) | ~told[start:stop]) for start, stop in runs):
+        raise DataError(f"the rate is {value:g} deg/s at every sample: no gyro", remedy="look at the recording")
+    return [_piece(z, r, told, run, phi, rate_hz) for run in _spread(runs)]
 
 
-def _runs(segment: np.ndarray, moving: np.ndarray | None, samples: int) -> list[tuple[int, int]]:
-    """First sample and last + 1 of the longest gap-free stretches in which all samples count, in order."""
-    breaks = np.diff(segment) != 0
+def _runs(segment: np.ndarray, moving: np.ndarray | None, told: np.ndarray) -> list[tuple[int, int]]:
+    """First sample and last + 1 of the stretches in which all samples count; both ends say something."""
+    counts = told if moving is None else told & np.asarray(moving, dtype=bool)
+    places = np.flatnonzero(counts)
+    if len(places) == 0:
+        return []
+    number = np.cumsum(np.diff(segment, prepend=segment[0]) != 0)
     if moving is not None:
-        breaks |= np.diff(np.asarray(moving, dtype=bool))
-    edges = [0, *(np.flatnonzero(breaks) + 1).tolist(), samples]
-    found = [
-        (start, stop)
-        for start, stop in pairwise(edges)
-        if stop - start >= SHORTEST and (moving is None or moving[start])
-    ]
-    return sorted(sorted(found, key=_shortness)[:RUNS])
+        number = number + np.cumsum(np.diff(np.asarray(moving, dtype=np.int8), prepend=0) != 0)
+    apart = (np.diff(places) > FILLED + 1) | (np.diff(number[places]) != 0)
+    edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(places)]
+    runs = [(int(places[first]), int(places[last - 1]) + 1) for first, last in pairwise(edges)]
+    return [(start, stop) for start, stop in runs if stop - start >= SHORTEST]
 
 
-def _shortness(run: tuple[int, int]) -> int:
-    return run[0] - run[1]
+def _spread(runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The runs in pieces of at most LONGEST samples: the longest ones, or spread evenly over a long recording."""
+    pieces = []
+    for start, stop in runs:
+        many = -(-(stop - start) // LONGEST)
+        edges = np.linspace(start, stop, many + 1).astype(int).tolist()
+        pieces += list(pairwise(edges))
+    length = np.array([stop - start for start, stop in pieces])
+    if length.sum() > MOST_SAMPLES:
+        many = max(int(len(pieces) * MOST_SAMPLES / length.sum()), 1)
+        pieces = [pieces[k] for k in np.linspace(0, len(pieces) - 1, many).astype(int).tolist()]
+        length = np.array([stop - start for start, stop in pieces])
+    return [pieces[k] for k in sorted(np.argsort(-length, kind="stable")[:MOST].tolist())]
 
 
-def _windows(runs: list[tuple[int, int]], total: int) -> list[tuple[int, int]]:
-    """WINDOWS windows about evenly spread over the runs, none twice."""
-    found = set()
-    for number in range(WINDOWS):
-        middle = (2 * number + 1) * total // (2 * WINDOWS)
-        for start, stop in runs:
-            if middle < stop - start:
-                first = min(max(start + middle - WINDOW // 2, start), max(stop - WINDOW, start))
-                found.add((first, min(first + WINDOW, stop)))
-                break
-            middle -= stop - start
-    return sorted(found)
-
-
-def _piece(z: np.ndarray, r: np.ndarray, run: tuple[int, int], phi: float) -> Series:
+def _piece(z: np.ndarray, r: np.ndarray, told: np.ndarray, run: tuple[int, int], phi: float, rate_hz: float) -> Piece:
     part = slice(*run)
-    return Series(z[part], np.broadcast_to(r, z.shape)[part], phi=phi)
+    own, known, taper = z[part], told[part], taper_of(run[1] - run[0])
+    variance = np.broadcast_to(r, z.shape)[part]
+    frequency = _frequencies(len(own), rate_hz)
+    turn = np.exp(-2j * math.pi * frequency / rate_hz)
+    if known.all():
+        noise = np.full(len(frequency), float(taper**2 @ variance))
+    else:
+        places = np.flatnonzero(known)
+        own = np.interp(np.arange(len(own)), places, own[places])
+        noise = _of_filled(places, taper[places] ** 2 * variance[places], turn)
+    noise = noise / (float(taper @ taper) * rate_hz) * (1.0 - phi**2) / np.abs(1.0 - phi * turn) ** 2
+    return Piece(run[0], own - float(taper @ own) / float(taper.sum()), taper, noise)
 
 
-def _means(z: np.ndarray, r: np.ndarray, run: tuple[int, int], size: int, phi: float) -> Series:
-    """Means of blocks of `size` samples; one sample that says nothing, and the block says nothing."""
-    count = (run[1] - run[0]) // size
-    part = slice(run[0], run[0] + count * size)
-    means = z[part].reshape(count, size).mean(axis=1)
-    variances = np.broadcast_to(r, z.shape)[part].reshape(count, size).mean(axis=1)
-    # Variance of the mean of AR(1) noise over that of one sample.
-    power, rest = phi**size, 1.0 - phi
-    shrink = ((1.0 + phi) / rest - 2.0 * phi * (1.0 - power) / (size * rest**2)) / size
-    return Series(means, variances * shrink, size, shrink=shrink)
+def taper_of(samples: int) -> np.ndarray:
+    """[T], flat in the middle, sin⁴ over a quarter at each end: lines far from their frequency fall with its 10th
+    power, so that a rate of eight decades does not leak into its noise."""
+    side = samples // 4
+    rise = np.sin(0.5 * math.pi * (np.arange(side) + 0.5) / side) ** 4
+    return np.concatenate([rise, np.ones(samples - 2 * side), rise[::-1]])
+
+
+def _frequencies(samples: int, rate_hz: float) -> np.ndarray:
+    return np.arange(1, (samples + 1) // 2) * (rate_hz / samples)
+
+
+def _of_filled(places: np.ndarray, power: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Of white noise [F], known at `places` with `power`, and a straight line between them.
+
+    A sample also counts in the gaps beside it: its kernel is 1 + Σ (1 - m/(g + 1))·e^(±iωm), m = 1 … g.
+    """
+    gaps = np.diff(places) - 1
+    beside = np.stack([np.append(0, gaps), np.append(gaps, 0)], axis=1)
+    sizes, which = np.unique(beside, axis=0, return_inverse=True)
+    shares = np.bincount(which.ravel(), weights=power)
+    total = np.zeros(len(turn))
+    for (before, after), share in zip(sizes.tolist(), shares.tolist(), strict=True):
+        kernel = np.ones(len(turn), dtype=complex)
+        for m in range(1, before + 1):
+            kernel += (1.0 - m / (before + 1.0)) * turn**-m
+        for m in range(1, after + 1):
+            kernel += (1.0 - m / (after + 1.0)) * turn**m
+        total += share * np.abs(kernel) ** 2
+    return total

@@ -1,4 +1,4 @@
-"""Models of the rate: how it moves from one sample to the next, and what the steady smoother lets through.
+"""Models of the rate: how it moves from one sample to the next.
 
 All states are in deg/s: the k-th derivative of the rate is multiplied by the k-th power of the sample period. In closed
 form, from dx = A·x·dt + G·dβ: F = e^(A·T) and Q = q·∫ e^(A·s) G G' e^(A'·s) ds over one period.
@@ -18,28 +18,44 @@ from vgyro.errors import DataError
 UNLIMITED = "none"
 """The model of a rate of which the neighbours say nothing: no smoothing."""
 
-UNITS = {"frequency_hz": " Hz", "damping": "", "second_hz": " Hz", "second_damping": "", "sd": " deg/s", "tau_s": " s"}
-Q_UNITS = {"random_walk": " deg²/s³", "acceleration": " deg²/s⁵", "jerk": " deg²/s⁷", "oscillator": " deg²/s³"}
 HALF_POWER = math.sqrt(0.5)
+
+UNITS = {"frequency_hz": " Hz", "damping": "", "second_hz": " Hz", "second_damping": "", "sd": " deg/s", "tau_s": " s"}
+NARROW = 1e-4
+"""Damping of an oscillation that is a sinusoid: what drives it does not count."""
+Q_UNITS = {"random_walk": " deg²/s³", "acceleration": " deg²/s⁵", "jerk": " deg²/s⁷", "oscillator": " deg²/s³"}
 
 
 @dataclass(frozen=True)
-class Likelihood:
-    """How well a model fits.
+class Line:
+    """A narrow line of the motion, a vibration: x'' + 2ζω·x' + ω²·x = white noise.
 
-    log_likelihood : the greatest, of each sample given those before it;  parameters : where it is;  samples : how many
-    bic      : -2·log_likelihood + (parameters)·ln(samples)
-    risk     : the least squared error of the smoother, estimated, in units of the noise, summed, but for a constant
-    tuned    : where that is; NaN and empty where it was not looked for
+    damping : ζ; at most NARROW: a sinusoid, which nothing drives;  sd : of the oscillation, deg/s
+    """
+
+    frequency_hz: float
+    damping: float
+    sd: float
+
+    @property
+    def text(self) -> str:
+        kind = "sinusoid" if self.damping <= NARROW else f"line, damping {self.damping:.2g}"
+        return f"{kind}, {self.frequency_hz:.4g} Hz, {self.sd:.3g} deg/s"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """How well a model smooths.
+
+    risk : squared error of the smoother, estimated, in units of the noise, summed
+    cost : risk + what the parameters cost
     """
 
     model: str
-    log_likelihood: float
-    bic: float
     parameters: Mapping[str, float]
-    samples: int
-    risk: float = math.nan
-    tuned: Mapping[str, float] = field(default_factory=dict)
+    lines: tuple[Line, ...]
+    risk: float
+    cost: float
 
 
 @dataclass(frozen=True)
@@ -52,15 +68,17 @@ class Motion:
                  where it drives a second one, second_hz and second_damping of that, and no random walk;
                  markov: tau_s, sd (deg/s)
     rate_hz    : of the samples
-    calibration : what the variance of the smoothed rate is multiplied by, from the spectrum of the residual
     table      : the models that it was chosen from
+    calibration : what the variance of the smoothed rate is multiplied by, from the spectrum of the residual
+    lines      : that the rate has besides
     """
 
     model: str
     parameters: Mapping[str, float]
     rate_hz: float
-    table: tuple[Likelihood, ...] = ()
+    table: tuple[Candidate, ...] = ()
     calibration: float = 1.0
+    lines: tuple[Line, ...] = ()
 
     @property
     def text(self) -> str:
@@ -68,10 +86,13 @@ class Motion:
             return "no smoothing"
         units = UNITS | {"q": Q_UNITS.get(self.model, "")}
         values = ", ".join(f"{name} = {value:.4g}{units[name]}" for name, value in self.parameters.items())
-        return f"{self.model}: {values}"
+        return " + ".join([f"{self.model}: {values}", *(line.text for line in self.lines)])
 
     def dynamics(self) -> Dynamics:
-        return dynamics(self.model, self.parameters, 1.0 / self.rate_hz)
+        found = dynamics(self.model, self.parameters, 1.0 / self.rate_hz)
+        for line in self.lines:
+            found = found.beside(_resonator(line.frequency_hz, line.damping, line.sd, 1.0 / self.rate_hz))
+        return found
 
 
 @dataclass(frozen=True)
@@ -119,35 +140,21 @@ class Dynamics:
     stationary: np.ndarray = field(repr=False)
     order: np.ndarray = field(repr=False)
 
-    def of_blocks(self, size: int) -> Dynamics:
-        """Of the means of `size` samples, exactly: the last state is the mean of h'x over the block, and is read."""
-        states = len(self.reads)
-        step = np.zeros((states + 1, states + 1))
-        step[:states, :states], step[states, :states], step[states, states] = (
-            self.transition, self.reads @ self.transition, 1.0,
-        )  # fmt: skip
-        enters = np.vstack([np.eye(states), self.reads])
-        F, Q = _power(step, enters @ self.process @ enters.T, size)
-        F[:, states] = 0.0
-        scale = np.append(np.ones(states), 1.0 / size)
+    def beside(self, other: Dynamics) -> Dynamics:
+        """The sum of two rates that know nothing of each other."""
         return Dynamics(
-            F * scale[:, None],
-            Q * np.outer(scale, scale),
-            np.eye(states + 1)[states],
-            np.pad(self.stationary, (0, 1)),
-            np.append(self.order, 0),
+            _blocks(self.transition, other.transition),
+            _blocks(self.process, other.process),
+            np.append(self.reads, other.reads),
+            _blocks(self.stationary, other.stationary),
+            np.append(self.order, other.order),
         )
 
 
-def _power(F: np.ndarray, Q: np.ndarray, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Transition and process of so many steps, by doubling."""
-    whole, drive = np.eye(len(F)), np.zeros_like(Q)
-    while steps:
-        if steps % 2:
-            whole, drive = F @ whole, F @ drive @ F.T + Q
-        F, Q = F @ F, F @ Q @ F.T + Q
-        steps //= 2
-    return whole, drive
+def _blocks(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    whole = np.zeros((len(first) + len(second),) * 2)
+    whole[: len(first), : len(first)], whole[len(first) :, len(first) :] = first, second
+    return whole
 
 
 def dynamics(model: str, parameters: Mapping[str, float], period: float) -> Dynamics:
@@ -197,7 +204,12 @@ def _markov(tau_s: float, sd: float, period: float) -> Dynamics:
 
 
 def _oscillator(frequency_hz: float, damping: float, sd: float, q: float, period: float) -> Dynamics:
-    """x'' + 2ζω·x' + ω²·x = white noise, of stationary s.d. `sd`, about a random walk: states level, x, x'·T."""
+    """A resonator about a random walk: states level, x, x'·T."""
+    return dynamics("random_walk", {"q": q}, period).beside(_resonator(frequency_hz, damping, sd, period))
+
+
+def _resonator(frequency_hz: float, damping: float, sd: float, period: float) -> Dynamics:
+    """x'' + 2ζω·x' + ω²·x = white noise, of stationary s.d. `sd`: states x, x'·T."""
     omega, scale = 2.0 * math.pi * frequency_hz, np.array([1.0, period])
     stationary = sd**2 * np.array([1.0, (omega * period) ** 2])
     rise, slope, stay = _impulse_response(np.array([period]), omega, damping)
@@ -210,10 +222,7 @@ def _oscillator(frequency_hz: float, damping: float, sd: float, q: float, period
         rise, slope, _ = _impulse_response(0.5 * period * (nodes + 1.0), omega, damping)
         rows = scale[:, None] * np.array([rise, slope])
         Q = 4.0 * damping * omega**3 * sd**2 * 0.5 * period * (rows * weights) @ rows.T
-    whole, drive = np.eye(3), np.zeros((3, 3))
-    whole[1:, 1:], drive[1:, 1:], drive[0, 0] = F, Q, q * period
-    known = np.diag(np.append(math.nan, stationary))
-    return Dynamics(whole, drive, np.array([1.0, 1.0, 0.0]), known, np.array([0, 0, 1]))
+    return Dynamics(F, Q, np.array([1.0, 0.0]), np.diag(stationary), np.array([0, 1]))
 
 
 def _pair(
@@ -301,7 +310,7 @@ class SteadyGain:
     @property
     def random_walk_ratio(self) -> float | None:
         """Q/r of a random walk in white noise, whose gain has closed forms; None of any other."""
-        if self.motion.model != "random_walk" or self.phi:
+        if self.motion.model != "random_walk" or self.phi or self.motion.lines:
             return None
         return self.motion.parameters["q"] / self.motion.rate_hz / self.r
 
@@ -334,14 +343,16 @@ class SteadyGain:
         return float(np.trapezoid(gain**2, frequency) + gain[0] ** 2 * frequency[0])
 
     def frequencies(self) -> np.ndarray:
-        """Dense where G changes: toward 0, and around the frequency of an oscillator."""
+        """Dense where G changes: toward 0, and around the frequency of an oscillation."""
         half = 0.5 * self.motion.rate_hz
         frequency = half * np.logspace(-9.0, 0.0, 4000)
-        if self.motion.model == "oscillator":
+        peaks = [
+            self.motion.parameters[name] for name in ("frequency_hz", "second_hz") if name in self.motion.parameters
+        ]
+        for own in [*peaks, *(line.frequency_hz for line in self.motion.lines)]:
             near = np.logspace(-9.0, -0.05, 1500)
-            for own in (self.motion.parameters.get(name, math.nan) for name in ("frequency_hz", "second_hz")):
-                frequency = np.concatenate([frequency, own * (1.0 - near), [own], own * (1.0 + near)])
-            frequency = np.unique(frequency)
+            frequency = np.concatenate([frequency, own * (1.0 - near), [own], own * (1.0 + near)])
+        frequency = np.unique(frequency)
         return frequency[frequency <= half]
 
 

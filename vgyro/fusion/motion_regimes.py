@@ -33,7 +33,9 @@ class Regimes:
         """One for each level of the process noise. The calibration is that of a model that holds throughout."""
         levels = activity or Activity.even(samples)
         F = np.stack([dynamics.transition] * len(levels.factor))
-        Q = levels.factor[:, None, None] * dynamics.process
+        # A line is as narrow as it is.
+        own = np.arange(len(dynamics.reads)) < len(dynamics.reads) - 2 * len(motion.lines)
+        Q = np.where(np.outer(own, own), levels.factor[:, None, None], 1.0) * dynamics.process
         calibration = np.full(len(F), motion.calibration if activity is None else 1.0)
         return cls(F, Q, levels.level, calibration, levels.level)
 
@@ -91,18 +93,19 @@ def jumps_at_ends(
 def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -> tuple[np.ndarray, np.ndarray]:
     """Transition and process of a step to a sample at rest, of the states of `motion`.
 
-    The rate as a whole goes on as the random walk `rest`; derivatives and oscillation end, and begin about zero with
-    what the filter of white noise of this density (deg²/s) knows of them while it moves.
+    The rate as a whole goes on as the random walk `rest`, and its lines as they are; derivatives and oscillation end,
+    and begin about zero with what the filter of white noise of this density (deg²/s) knows of them while it moves.
     """
     if rest.model != "random_walk":
         raise DataError(f"the rate at rest is a random walk, not {rest.model}")
-    states = len(dynamics.reads)
-    F, Q = np.eye(states), np.zeros((states, states))
+    states = len(dynamics.reads) - 2 * len(motion.lines)
+    F, Q = dynamics.transition.copy(), dynamics.process.copy()
+    F[:states, :states], Q[:states, :states] = np.eye(states), 0.0
     Q[0, 0] = rest.parameters["q"] / rest.rate_hz
     if motion.model in ("acceleration", "jerk", "oscillator"):
-        F[1:] = 0.0
-        F[0] = dynamics.reads
-        Q[1:, 1:] = np.diag(_known_derivatives(motion, dynamics, density)[1:])
+        F[1:states, :states] = 0.0
+        F[0, :states] = dynamics.reads[:states]
+        Q[1:states, 1:states] = np.diag(_known_derivatives(motion, dynamics, density)[1:states])
     return F, Q
 
 

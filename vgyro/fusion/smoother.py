@@ -18,9 +18,9 @@ from vgyro import engine as engines
 from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError
 from vgyro.fusion.motion_choice import choose_motion
-from vgyro.fusion.motion_evidence import wide_start
 from vgyro.fusion.motion_models import UNLIMITED, Activity, Motion, SteadyGain, fixed_bandwidth
 from vgyro.fusion.motion_regimes import Regimes, jumps_at_ends
+from vgyro.fusion.motion_start import wide_start
 
 __all__ = ["Smoothed", "choose_motion", "fixed_bandwidth", "smooth"]
 

@@ -30,7 +30,7 @@ cdef extern from "statespace.h" nogil:
     int vg_statespace_smooth(const vg_statespace *model, const vg_measured *measured, const double *start,
                              const double *spread, double *smoothed, double *variance)
 
-MOST_STATES = 5
+MOST_STATES = 11
 
 
 cdef vg_statespace _model(const double[:, :, ::1] transition, const double[:, :, ::1] process,

@@ -238,7 +238,13 @@ VG_INLINE int smooth(const int n, const vg_statespace *s, const vg_measured *m, 
     case 2: call(2); break; \
     case 3: call(3); break; \
     case 4: call(4); break; \
-    default: call(5); break; \
+    case 5: call(5); break; \
+    case 6: call(6); break; \
+    case 7: call(7); break; \
+    case 8: call(8); break; \
+    case 9: call(9); break; \
+    case 10: call(10); break; \
+    default: call(11); break; \
     }
 
 void vg_statespace_likelihood(const vg_statespace *model, const vg_measured *measured, const double *start,

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 /* The most states, with that of the coloured noise. */
-#define VG_STATES 5
+#define VG_STATES 11
 
 /* Samples between two places at which the forward pass keeps its state for the backward pass. */
 #define VG_STATESPACE_CHUNK 1024
