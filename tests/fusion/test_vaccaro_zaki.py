@@ -131,7 +131,7 @@ def test_covariances_of_the_recording_itself():
     np.testing.assert_allclose(found.tau, expected.tau)
     np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-9, atol=1e-14)
     np.testing.assert_allclose(found.pairs, expected.pairs)
-    assert vaccaro_zaki(array, PARAMETERS).note.endswith("Allan covariances from this recording")
+    assert vaccaro_zaki(array, PARAMETERS).note.endswith("weights made from this very recording")
 
 
 @pytest.mark.parametrize("name", ["vaccaro_zaki", "scale_wise_all", "scale_wise_large"])

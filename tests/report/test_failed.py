@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vgyro.fusion import rest_scales
+from vgyro.report.best import FROM_ITSELF, best_of_all
 from vgyro.report.conclusions import conclude
 from vgyro.report.dataset_page import headline
 from vgyro.report.failed import failed_sentences
@@ -93,3 +95,14 @@ def test_methods_of_other_packages_have_their_own_heading(dataset: DatasetPart) 
     html = rest_tables(found, next(one for one in found.arrays if one.anchor == "rest-x"))
     assert "Methods of other packages" in html
     assert source in html
+
+
+def test_weights_made_from_the_recording_are_not_its_best(dataset: DatasetPart) -> None:
+    array = next(one for one in dataset.arrays if one.anchor == "rest-x")
+    best = best_of_all(array)
+    assert best is not None
+    made = with_methods(dataset, {best.method: {"note": f"drift of 1 deg/s/√s; {FROM_ITSELF}"}}, ("rest-x",))
+    other = best_of_all(next(one for one in made.arrays if one.anchor == "rest-x"))
+    assert other is not None
+    assert other.method != best.method
+    assert rest_scales.FROM_ITSELF == FROM_ITSELF

@@ -51,3 +51,10 @@ def test_none_without_rest(tmp_path):
     chain = noise_record(tmp_path, rate)
     record = {name: value for name, value in chain.noise().items() if not name.startswith("allan_")}
     assert noise_of_record(record, list(GYROS)).scales is None
+
+
+def test_whose_they_are(tmp_path):
+    # Of the recording that is fused, or of another one.
+    record = noise_record(tmp_path, white(30, 3)).noise()
+    own = [noise_of_record(record, list(GYROS), name).scales.own for name in (record["recording"], "other", "")]
+    assert own == [True, False, False]

@@ -38,11 +38,13 @@ class AllanScales:
                  row and column of a gyro that had too few values
     pairs      : array [J], how many pairs of adjacent means over τ the record has side by side: about the degrees of
                  freedom of each estimate
+    own        : they are of the very recording that is fused
     """
 
     tau: np.ndarray
     covariance: np.ndarray
     pairs: np.ndarray
+    own: bool = False
 
 
 @dataclass(frozen=True)

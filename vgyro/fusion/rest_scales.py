@@ -9,7 +9,8 @@ from vgyro.fusion.array import AllanScales, ArrayRates, CannotRun, FilterParamet
 LONGEST_TAU = 4  # the longest τ is a fourth of the longest stretch: half of it then holds differences
 MOST_DIFFERENCES = 1 << 17
 NO_RECORD = "no record at rest has given the Allan covariances of the gyros"
-FROM_ITSELF = "Allan covariances from this recording"
+FROM_ITSELF = "weights made from this very recording"
+"""Part of the note of a row that has seen what it weighs; the report looks for it."""
 
 
 def rest_scales(array: ArrayRates, parameters: FilterParameters) -> tuple[AllanScales, str]:
@@ -20,7 +21,7 @@ def rest_scales(array: ArrayRates, parameters: FilterParameters) -> tuple[AllanS
     """
     known = array.noise.scales
     if known is not None:
-        return known, ""
+        return known, FROM_ITSELF if known.own else ""
     if parameters.in_motion or not array.at_rest.all():
         raise CannotRun(NO_RECORD, remedy="add a recording at rest to the data set")
     return array.once("rest_scales", lambda: own_scales(array)), FROM_ITSELF
@@ -45,7 +46,7 @@ def own_scales(array: ArrayRates) -> AllanScales:
             differences.append(np.concatenate([second_differences(one, m, stride) for one in angles]))
     covariance = np.array([_covariance(np.column_stack(differences)) for differences in found])
     pairs = np.maximum(length / factors[:, None] - 1, 0).sum(axis=1)
-    return AllanScales(factors / array.rate_hz, covariance, pairs)
+    return AllanScales(factors / array.rate_hz, covariance, pairs, own=True)
 
 
 def angle_of(rate: np.ndarray) -> np.ndarray:

@@ -20,15 +20,17 @@ FAIR, RAW = "if_sigma_equal", "if_sigma"
 FACTORS = ((FAIR, "1σ at equal bandwidth"), ("if_arw", "N"), ("if_bias_drift", "bias drift"))
 RAW_FACTOR = (RAW, "1σ")
 IN_SAMPLE = "_in_sample"
+FROM_ITSELF = "weights made from this very recording"
+"""In the note of a row whose fixed weights are of the least Allan variance in the recording that is judged."""
 AVERAGING_S = 1.0
 """Weights that are best for the samples need not be for means over so long."""
 OFFLINE = " (offline)"
 BEST_RULES = (
     "Best method: the greatest improvement factor over the mean of the single gyros, in each axis' main recording at "
     "rest, by 1σ at equal bandwidth (every series low-passed to one bandwidth), by the fitted N and by bias drift. "
-    "In-sample weights are left out, because they have seen what they weigh. Where the best is an offline method, the "
-    "best causal one is named, too. A smoother whose shape is not that of a low-pass run once, or forward and back, is "
-    "not compared by 1σ or N.",
+    "In-sample weights, and fixed weights that were made from the very recording, are left out, because they have seen "
+    "what they weigh. Where the best is an offline method, the best causal one is named, too. A smoother whose shape "
+    "is not that of a low-pass run once, or forward and back, is not compared by 1σ or N.",
     "In motion: the least 1σ of the error against the reference, in-sample weights left out again.",
     "Which method is best depends on the averaging time: of those that keep the full bandwidth, the one with the least "
     "Allan deviation at the shortest averaging time has not the least at 1 s, and the lower limit of its own there is "
@@ -58,10 +60,11 @@ class Best:
 
 def best_method(array: ArrayPart, figure: str, allowed: Callable[[Name], bool] = lambda _: True) -> Best | None:
     """The method, not in-sample, with the greatest improvement factor, of those that `allowed` lets pass."""
+    seen = in_sample(array)
     found = [
         Best(label, name, figure, array.values()[name][figure], array.axis, array.recording)
         for name, label in _labels(array).items()
-        if not name[0].endswith(IN_SAMPLE) and allowed(name) and figure in _known(array, name)
+        if name not in seen and allowed(name) and figure in _known(array, name)
         if not says_limited(array.values()[name][figure])
     ]
     return max(found, key=lambda best: best.factor.value, default=None)
@@ -76,6 +79,15 @@ def best_of_all(array: ArrayPart) -> Best | None:
     limited = {(row["method"], row["definition"]) for row in array.methods() if np.isfinite(row["bandwidth_hz"])}
     fair = best_method(array, FAIR, lambda name: name not in failed)
     return fair or best_method(array, RAW, lambda name: name not in failed and name not in limited)
+
+
+def in_sample(array: ArrayPart) -> set[Name]:
+    """Methods whose weights have seen what they weigh."""
+    return {
+        (row["method"], row["definition"])
+        for row in array.methods()
+        if str(row["method"]).endswith(IN_SAMPLE) or FROM_ITSELF in str(row["note"])
+    }
 
 
 def _known(array: ArrayPart, name: Name) -> Mapping[str, Value]:
@@ -126,7 +138,7 @@ def _recommended(array: ArrayPart, place: str) -> list[Conclusion]:
 def _averaging_sentence(array: ArrayPart, place: str) -> list[Conclusion]:
     """Where the best method of full bandwidth at the shortest averaging time is not the best at 1 s."""
     limited = {row["column"] for row in array.methods() if np.isfinite(row["bandwidth_hz"])}
-    failed = failing(array)
+    failed, seen = failing(array), in_sample(array)
     columns = {row["column"]: (row["method"], row["definition"]) for row in array.methods() if row["column"]}
     labels = _labels(array)
     curves: dict[float, dict[Name, tuple[float, float]]] = {}
@@ -134,7 +146,7 @@ def _averaging_sentence(array: ArrayPart, place: str) -> list[Conclusion]:
         name = columns.get(row["series"])
         if row["kind"] != OVERLAPPING or name is None or name in failed or row["series"] in limited:
             continue
-        if not name[0].endswith(IN_SAMPLE) and np.isfinite(row["deviation"]):
+        if name not in seen and np.isfinite(row["deviation"]):
             curves.setdefault(float(row["tau"]), {})[name] = (float(row["deviation"]), float(row["low"]))
     if not curves:
         return []
@@ -219,7 +231,7 @@ def motion_sentences(dataset: DatasetPart) -> list[Conclusion]:
     """The method with the least error in each recording that has a reference, and the causal one with the least."""
     found = []
     for array in dataset.arrays:
-        labels = {name: label for name, label in _labels(array).items() if not name[0].endswith(IN_SAMPLE)}
+        labels = {name: label for name, label in _labels(array).items() if name not in in_sample(array)}
         errors = {name: _known(array, name)["error_sigma"] for name in labels if "error_sigma" in _known(array, name)}
         if not errors:
             continue

@@ -76,7 +76,7 @@ def open_array(task: Task) -> OpenArray:
     tables = [*task.inputs.get("weights", []), *task.inputs.get("moved", [])]
     block_hz = file.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
     weights, deviations, reasons = read_weights(tables, gyros, file, block_hz)
-    noise = read_noise(task.input("noise"), gyros)
+    noise = read_noise(task.input("noise"), gyros, file.path.parent.name)
     rates = ArrayRates(
         file.rate, file.rate_hz, file.segment, file.at_rest, noise, weights, reasons,
         faults=tuple(event for path in task.inputs.get("faults", []) for event in read_faults(path, gyros, file)),
@@ -115,12 +115,12 @@ def in_motion(kind: str, at_rest: np.ndarray, moved: bool) -> bool:
     return not (kind == "free" and bool(at_rest.all()))
 
 
-def read_noise(path: Path, gyros: list[str]) -> ArrayNoise:
-    """Noise of an array from noise/<axis>.json; a coefficient that was not found is NaN."""
-    return noise_of_record(read_json(path), gyros)
+def read_noise(path: Path, gyros: list[str], recording: str = "") -> ArrayNoise:
+    """Noise of an array from noise/<axis>.json; a coefficient that was not found is NaN.  recording : the fused one"""
+    return noise_of_record(read_json(path), gyros, recording)
 
 
-def noise_of_record(record: Mapping[str, Any], gyros: list[str]) -> ArrayNoise:
+def noise_of_record(record: Mapping[str, Any], gyros: list[str], recording: str = "") -> ArrayNoise:
     """Noise of an array from what the stage `noise` wrote (vgyro.tasks.noise.record_of)."""
     places = [record["gyros"].index(gyro) for gyro in gyros]
     arw, rrw = (np.array([record[name][gyro] for gyro in gyros], dtype=float) for name in ("arw", "rrw"))
@@ -132,7 +132,8 @@ def noise_of_record(record: Mapping[str, Any], gyros: list[str]) -> ArrayNoise:
         tau, covariance, pairs = (
             np.array(record[f"allan_{name}"], dtype=float) for name in ("tau", "covariance", "pairs")
         )
-        scales = AllanScales(tau, covariance[:, places][:, :, places], pairs)
+        own = bool(recording) and record.get("recording") == recording
+        scales = AllanScales(tau, covariance[:, places][:, :, places], pairs, own)
     return ArrayNoise(arw, rrw, correlation, note, scales)
 
 
