@@ -20,8 +20,10 @@ BLOCK_S, LEAST_BLOCK = 0.25, 8
 """Length of the blocks, s, and samples of one at least."""
 STEP = 2.0
 """From one level to the next the smoother's bandwidth changes by this factor."""
-FIRST, MOST = 3, 6
+FIRST, MOST = 1, 6
 """Levels on either side that are looked at first, and at most."""
+FAR = 6.0
+"""A square counts no more, over the variance: one sample far off is no motion."""
 ORDER = {"random_walk": 1, "markov": 1, "acceleration": 2, "oscillator": 2, "jerk": 3}
 """The bandwidth of the smoother goes with the 2·order-th root of the process noise."""
 
@@ -89,7 +91,7 @@ def _errors(
 ) -> np.ndarray:
     """Estimated squared error of the smoother in each block, in units of the noise, but for a constant."""
     with np.errstate(invalid="ignore"):
-        squares = ((z - rate) ** 2 + 2.0 * variance) / r
+        squares = np.minimum((z - rate) ** 2 / r, FAR) + 2.0 * variance / r
     squares[~counts] = 0.0
     return np.add.reduceat(squares, begins) * (1.0 - phi) / (1.0 + phi)
 

@@ -18,6 +18,9 @@ SHORTEST = 32
 """Samples of a piece at least."""
 FILLED = 16
 """So many samples in a row that say nothing are filled in by a straight line; more of them end a piece."""
+SPIKE, RARE = 5.0, 0.03
+"""A sample that lies so many standard deviations off the line between its neighbours says nothing of the motion, where
+such samples are no larger a share: more of them are motion."""
 PER_OCTAVE = 24
 """Bands of the spectrum in a factor of two: each as wide as 3 % of its frequency, or one line of the periodogram."""
 
@@ -121,7 +124,21 @@ def gather(
     value = z[runs[0][0]]
     if all(np.all((z[start:stop] == value) | ~told[start:stop]) for start, stop in runs):
         raise DataError(f"the rate is {value:g} deg/s at every sample: no gyro", remedy="look at the recording")
-    return [_piece(z, r, told, run, phi, rate_hz) for run in _spread(runs)]
+    runs = _spread(runs)
+    spikes = _spikes(z, r)
+    if np.count_nonzero(spikes & told) <= RARE * total:
+        told = told & ~spikes
+    return [_piece(z, r, told, run, phi, rate_hz) for run in runs]
+
+
+def _spikes(z: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Samples [T] that are far off the line between their neighbours, while those are not far from each other."""
+    spikes = np.zeros(len(z), dtype=bool)
+    limit = 2.0 * SPIKE**2 * (r if r.ndim == 0 else r[1:-1])
+    with np.errstate(invalid="ignore"):
+        off = z[1:-1] - 0.5 * (z[:-2] + z[2:])
+        spikes[1:-1] = (off**2 > 0.75 * limit) & ((z[2:] - z[:-2]) ** 2 < limit)
+    return spikes
 
 
 def _runs(segment: np.ndarray, moving: np.ndarray | None, told: np.ndarray) -> list[tuple[int, int]]:

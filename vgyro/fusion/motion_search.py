@@ -156,11 +156,11 @@ def signal_of(spectrum: Spectrum, fit: Fit, lines: tuple[Line, ...]) -> np.ndarr
 
 
 def _bounds(spectrum: Spectrum) -> dict[str, tuple[float, float]]:
-    lowest, half = spectrum.frequency[0], 0.5 * spectrum.rate_hz
+    lowest = spectrum.frequency[0]
     hertz = (0.01 * lowest, FASTEST * spectrum.rate_hz)
     size = math.sqrt(float(spectrum.noise.mean()) * spectrum.rate_hz)
     return {
-        "q": (1e-60, 1e60), "tau_s": (0.05 / half, 1e3 / lowest), "sd": (1e-9 * size, 1e9 * size),
+        "q": (1e-60, 1e60), "tau_s": (1.0 / (2.0 * math.pi * hertz[1]), 1e3 / lowest), "sd": (1e-9 * size, 1e9 * size),
         "frequency_hz": hertz, "second_hz": hertz, "damping": DAMPING, "second_damping": DAMPING,
     }  # fmt: skip
 
