@@ -19,7 +19,7 @@ from vgyro.fusion.motion_models import Motion
 from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.parity_dcc import prefer_dcc
 from vgyro.fusion.prepared import prepared
-from vgyro.fusion.quantised import least_variance
+from vgyro.fusion.quantised import grid, lasting_of_mean, least_variance
 from vgyro.fusion.slow import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.smoother import choose_motion
@@ -59,6 +59,16 @@ class Analysed:
         if lost is not None:
             found[lost] = np.inf
         return found
+
+    def at_least(self, variance: np.ndarray, weights: np.ndarray, parameters: FilterParameters) -> np.ndarray:
+        """Variance [T] of the slow error with, at rest, no less than rounding leaves; weights [M, N]."""
+        known = grid(self.array)
+        if not parameters.has("quantised") or not known.step.any() or not self.array.at_rest.any():
+            return variance
+        shares = self.variances.shares / len(self.array.rate)
+        usual = shares @ shared_variances(self.array, parameters, True).variance
+        least = lasting_of_mean(known, usual, self.slow.bias.mean(axis=0), shares @ weights)
+        return np.where(self.array.at_rest, np.maximum(variance, least), variance)
 
     def bridged(self, rate: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A rate and its variance [T] as a smoother takes them: with what is likely where no gyro says anything."""

@@ -15,6 +15,7 @@ from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
 from vgyro.fusion.missing import away
+from vgyro.fusion.quantised import steps
 
 BLOCK_S = 0.25
 FEWEST_SAMPLES = 16
@@ -26,7 +27,8 @@ SLOW_BLOCKS = 32
 STUCK_SAMPLES = 16
 STUCK_SHARE = 1e-3
 """A gyro is stuck where its steps from sample to sample have, over so many samples, less than this share of the square
-that they have in the median of the gyros. Noise that small is of a gyro that does not measure, not of a perfect one."""
+that they have in the median of the gyros. Noise that small is of a gyro that does not measure, not of a perfect one.
+One whose values have steps is stuck only where the others move by such a step from sample to sample: else it rounds."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ def block_moments(array: ArrayRates, size: int | None = None, own: bool = False)
         for one in range(gyros):
             for other in range(one + 1):
                 square[blocks, one, other] = square[blocks, other, one] = _sums(values[one] * values[other], begin)
-    bad = _stuck(step, stop - start)
+    bad = _stuck(step, stop - start, steps(array))
     _mark(bad, start, stop, excluded(array.faults, len(array.rate), gyros))
     if array.missing is not None:
         _mark(bad, start, stop, [away(column, block_size(array.rate_hz)) for column in array.missing.T])
@@ -140,15 +142,19 @@ def _steps(values: np.ndarray, before: np.ndarray, begin: np.ndarray) -> np.ndar
     return _sums(steps * steps, begin).T
 
 
-def _stuck(step: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """[M, N]: blocks that lie in STUCK_SAMPLES samples with hardly a step; squared steps [M, N], samples [M]."""
+def _stuck(step: np.ndarray, size: np.ndarray, rounded: np.ndarray) -> np.ndarray:
+    """[M, N]: blocks that lie in STUCK_SAMPLES samples with hardly a step; squared steps [M, N], samples [M].
+
+    rounded : steps [N] of the gyros' values, deg/s; 0: none
+    """
     stuck = np.zeros(step.shape, dtype=bool)
     blocks = STUCK_SAMPLES if int(np.median(size)) == 1 else 1
     windows = len(step) - blocks + 1
     if windows < 1:
         return stuck
-    over, samples = (sum(one[shift : shift + windows] for shift in range(blocks)) for one in (step, size))
-    small = over <= STUCK_SHARE * np.median(over, axis=1, keepdims=True)
+    over, samples = (np.sum([one[shift : shift + windows] for shift in range(blocks)], axis=0) for one in (step, size))
+    usual = np.median(over, axis=1, keepdims=True)
+    small = (over <= STUCK_SHARE * usual) & (usual >= samples[:, None] * rounded**2)
     small &= np.greater_equal(samples, STUCK_SAMPLES)[:, None]
     for shift in range(blocks):
         stuck[shift : shift + windows] |= small

@@ -13,7 +13,7 @@ import numpy as np
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.clipped import without_clipped
 from vgyro.fusion.missing import unseen
-from vgyro.fusion.quantised import steps
+from vgyro.fusion.quantised import grid, with_grid
 from vgyro.fusion.tails import without_tails
 from vgyro.fusion.unseen import StandIn, stand_in
 
@@ -47,12 +47,14 @@ def _prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
     faults = tuple(one for one in array.faults if one.kind not in mended)
     if len(faults) < len(array.faults):
         array = replace(array, faults=faults)
-    step = steps(array) if parameters.has("quantised") else np.zeros(array.rate.shape[1])
+    known = grid(array)
+    step = known.step if parameters.has("quantised") else np.zeros(array.rate.shape[1])
     if parameters.has("clipped"):
         array, note = without_clipped(array)
         notes.append(note)
     if parameters.has("tails"):
         array, note = without_tails(array, step)
         notes.append(note)
+    array = with_grid(array, known)
     guess = stand_in(array, lost) if parameters.in_motion else None
     return Prepared(array, step, tuple(filter(None, notes)), guess)

@@ -41,7 +41,7 @@ def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
         known.variances.colour(shares),
         weights,
         "; ".join(filter(None, [known.note, note])),
-        known.slow.at_samples(slow_variance(weights, known.slow)),
+        known.at_least(known.slow.at_samples(slow_variance(weights, known.slow)), shares, parameters),
         undo_pole=known.variances.all_coloured(shares),
     )
     return smoothed(array, parameters, signal)
