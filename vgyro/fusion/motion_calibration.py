@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vgyro.fusion.motion_evidence import Spectrum
@@ -11,6 +13,8 @@ PASSED = 0.05
 BELIEF = 0.25
 """Standard deviation of the calibration before the residual is looked at: how wrong a model of least risk is."""
 LEAST, MOST = 0.25, 4.0
+SURE = 4.0
+"""Standard errors above which there is motion that is not passed."""
 
 
 def calibration(spectrum: Spectrum, signal: np.ndarray) -> float:
@@ -33,3 +37,16 @@ def calibration(spectrum: Spectrum, signal: np.ndarray) -> float:
     # A line of the periodogram has two degrees of freedom, and a weight of two of them.
     variance = 2.0 * float(spectrum.weight[passed] @ expected[passed] ** 2) / claimed**2
     return min(max(1.0 + mean * BELIEF**2 / (BELIEF**2 + variance), LEAST), MOST)
+
+
+def lost(spectrum: Spectrum, signal: np.ndarray) -> float:
+    """Variance of the motion that the smoother takes away, (deg/s)²: ∫ (1 - H)²·(S_z - S_v), as far as it is certain.
+
+    signal : S [F], which makes the smoother and need not be the density of the motion
+    Zero within SURE standard errors.
+    """
+    H = signal / (signal + spectrum.noise)
+    share = (1.0 - H) ** 2 * spectrum.weight / float(spectrum.weight.sum()) * spectrum.rate_hz
+    mean = float(share @ (spectrum.power - spectrum.noise))
+    error = math.sqrt(2.0 * float((share * spectrum.noise) ** 2 @ (1.0 / spectrum.weight)))
+    return mean if mean > SURE * error else 0.0

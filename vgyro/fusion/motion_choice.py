@@ -9,8 +9,8 @@ closed form in the spectrum of the fused rate (vgyro.fusion.motion_evidence).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from vgyro import engine as engines
 from vgyro.config import MOTION_MODELS
 from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError, EngineError
-from vgyro.fusion.motion_calibration import calibration
+from vgyro.fusion.motion_calibration import calibration, lost
 from vgyro.fusion.motion_evidence import Piece, Spectrum, gather, spectrum
 from vgyro.fusion.motion_lines import fine_bands, peak, single, sinusoid, without_peaks
 from vgyro.fusion.motion_models import UNLIMITED, Candidate, Line, Motion
@@ -26,7 +26,9 @@ from vgyro.fusion.motion_search import PRICE, Fit, crossing_of, line_price, refi
 from vgyro.fusion.motion_start import wide_start
 
 DRIVEN = ("random_walk", "acceleration", "jerk")
-MOST_LINES = 3
+MOST_LINES, MOST_FOREIGN = 3, 10
+WIDE = 0.1
+"""Damping of an oscillation that is no line of a board at rest."""
 AROUND = 1.2
 """Whether a line has a width is seen from the spectrum within this factor of its frequency."""
 SPENT = 4.0
@@ -39,13 +41,12 @@ CHECKED = 1 << 14
 class Compared:
     """Models compared on the pieces of a recording without the sinusoids that were taken out of them.
 
-    whole : all lines of the periodograms;  bands : of them, on which the fits were made
+    bands : of the spectrum, on which the fits were made
     fits  : in order of their cost;  spent : cost of the sinusoids
     """
 
     pieces: list[Piece]
     sinusoids: tuple[Line, ...]
-    whole: Spectrum
     bands: Spectrum
     fits: list[Fit]
     spent: float
@@ -64,16 +65,18 @@ def choose_motion(
     models: Sequence[str] = MOTION_MODELS,
     engine: str = "native",
     moving: np.ndarray | None = None,
+    shared: Callable[[float], bool] | None = None,
 ) -> Motion:
     """The model of the rate whose smoother has the least estimated error.
 
     z, r, segment, rate_hz, phi : as in vgyro.fusion.smoother.smooth;  moving : [T] bool, only these samples count
-    models : names of those to choose from
+    models : names of those to choose from;  shared : whether a line at a frequency, Hz, is motion; None: all are
     A constant rate is a legal answer, q = 0, and so is no smoothing, `none`. Lines that stand in the spectrum of z are
     motion: sinusoids, or with a width. A model whose smoother breaks down is left out.
     raises : DataError if the samples do not change, or if r is not above zero; TooShort
     """
-    found = _best(gather(z, r, segment, rate_hz, phi, moving), rate_hz, _families(models))
+    pieces = gather(z, r, segment, rate_hz, phi, moving)
+    found = _best(pieces, rate_hz, _families(models), shared)
     rows = tuple(
         Candidate(*_named(fit, found.sinusoids, models), fit.risk + found.spent, fit.cost + found.spent)
         for fit in found.fits
@@ -107,34 +110,97 @@ def _families(models: Sequence[str]) -> list[str]:
     return [one for model in models for one in (("resonance", "pair") if model == "oscillator" else (model,))]
 
 
-def _best(pieces: list[Piece], rate_hz: float, families: Sequence[str]) -> Compared:
+def _best(
+    pieces: list[Piece], rate_hz: float, families: Sequence[str], shared: Callable[[float], bool] | None
+) -> Compared:
     """With lines and without. Lines are looked for beside the motion that the spectrum without peaks has: other models
     take a line for a part of themselves."""
-    plain = _compared(pieces, (), (), rate_hz, families)
-    bare = still(plain.bands) if single(plain.whole) else _bare(plain.bands)
-    here, whole = pieces, plain.whole
-    lines: tuple[Line, ...] = ()
+    whole = spectrum(pieces, rate_hz)
+    plain = _compared(Found(pieces, whole), families)
+    bare = still(plain.bands) if single(whole) else _bare(plain.bands)
+    found = _lines(pieces, whole, bare, shared)
+    if found.foreign:
+        plain = _compared(Found(pieces, whole.without(found.foreign)), families)
+    if not found.lines and not found.sinusoids:
+        return plain
+    return min(plain, _compared(found, families), key=lambda one: one.cost)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Lines of a recording.
+
+    pieces, whole : without the sinusoids, and all lines of their spectrum, without the bands `foreign`
+    sinusoids, lines : of the motion, without and with a width;  foreign : bands of lines that are none, Hz
+    """
+
+    pieces: list[Piece]
+    whole: Spectrum
     sinusoids: tuple[Line, ...] = ()
-    for _ in range(MOST_LINES):
-        there = peak(whole, signal_of(whole, bare, lines))
+    lines: tuple[Line, ...] = ()
+    foreign: tuple[tuple[float, float], ...] = ()
+
+
+def _lines(pieces: list[Piece], whole: Spectrum, bare: Fit, shared: Callable[[float], bool] | None) -> Found:
+    """Lines that are worth their price beside the motion `bare`, the one that lowers the risk most first."""
+    found = Found(pieces, whole)
+    while len(found.lines) + len(found.sinusoids) < MOST_LINES and len(found.foreign) < MOST_FOREIGN:
+        there = peak(found.whole, signal_of(found.whole, bare, found.lines))
         if there.gain < line_price(whole):
             break
+        if shared is not None and not shared(there.frequency_hz):
+            foreign = (*found.foreign, there.band())
+            found = replace(found, foreign=foreign, whole=found.whole.without(foreign))
+            continue
         around = there.frequency_hz / AROUND, there.frequency_hz * AROUND
-        near = fine_bands(whole.between(*around), [there.frequency_hz])
-        others = signal_of(near, bare, lines)
+        near = fine_bands(found.whole.between(*around), [there.frequency_hz])
+        others = signal_of(near, bare, found.lines)
         wide = refine(near, "", np.empty(0), (there.line(),), others)
         if there.sharp:
-            line, left = sinusoid(here, rate_hz, there.frequency_hz)
-            without = spectrum(left, rate_hz)
+            line, left = sinusoid(found.pieces, whole.rate_hz, there.frequency_hz)
+            without = spectrum(left, whole.rate_hz).without(found.foreign)
             risk = float(fine_bands(without.between(*around), [there.frequency_hz]).risk(others))
             if risk + _spent((line,), without) < wide.risk + line_price(whole):
-                here, whole, sinusoids = left, without, (*sinusoids, line)
+                found = replace(found, pieces=left, whole=without, sinusoids=(*found.sinusoids, line))
                 continue
-        lines = (*lines, *wide.lines)
-    if not lines and not sinusoids:
-        return plain
-    found = _compared(here, sinusoids, lines, rate_hz, families)
-    return min(plain, found, key=lambda one: one.cost)
+        found = replace(found, lines=(*found.lines, *wide.lines))
+    return found
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """What a recording at rest has beside the fixed bandwidth of its smoother.
+
+    lines : vibrations, which are passed;  lost : variance of what else is seen of motion and is not passed, (deg/s)²
+    """
+
+    lines: tuple[Line, ...]
+    lost: float
+
+
+def beside_fixed(
+    z: np.ndarray,
+    r: float | np.ndarray,
+    segment: np.ndarray,
+    rate_hz: float,
+    phi: float,
+    fixed: Motion,
+    shared: Callable[[float], bool] | None = None,
+) -> AtRest:
+    """The motion that the smoother `fixed`, of a board at rest, would take away.
+
+    z, r, segment, rate_hz, phi, shared : as in choose_motion
+    raises : as choose_motion
+    """
+    if fixed.model == UNLIMITED:
+        return AtRest((), 0.0)
+    pieces = gather(z, r, segment, rate_hz, phi, None)
+    whole = spectrum(pieces, rate_hz)
+    bare = Fit(fixed.model, fixed.parameters, (), np.empty(0), 0.0, 0.0)
+    found = _lines(pieces, whole, bare, shared)
+    lines = tuple(line for line in found.lines if line.damping < WIDE)
+    rest = fine_bands(found.whole, [line.frequency_hz for line in lines])
+    return AtRest((*found.sinusoids, *lines), lost(rest, signal_of(rest, bare, lines)))
 
 
 def _bare(bands: Spectrum) -> Fit:
@@ -143,10 +209,8 @@ def _bare(bands: Spectrum) -> Fit:
     return min((search(smooth, family, (), 0.0) for family in DRIVEN), key=lambda fit: fit.cost)
 
 
-def _compared(
-    pieces: list[Piece], sinusoids: tuple[Line, ...], lines: tuple[Line, ...], rate_hz: float, families: Sequence[str]
-) -> Compared:
-    whole = spectrum(pieces, rate_hz)
+def _compared(found: Found, families: Sequence[str]) -> Compared:
+    whole, lines = found.whole, found.lines
     bands = fine_bands(whole, [line.frequency_hz for line in lines])
     fits = [still(bands, lines)]
     if lines:
@@ -155,7 +219,8 @@ def _compared(
     crossing = crossing_of(bands, min(fits, key=lambda fit: fit.cost).signal)
     fits += [search(bands, family, lines, crossing) for family in families if family not in DRIVEN]
     fits = [fit for fit in fits if not fit.family or fit.family in families]
-    return Compared(pieces, sinusoids, whole, bands, sorted(fits, key=lambda fit: fit.cost), _spent(sinusoids, whole))
+    fits.sort(key=lambda fit: fit.cost)
+    return Compared(found.pieces, found.sinusoids, bands, fits, _spent(found.sinusoids, whole))
 
 
 def _spent(sinusoids: tuple[Line, ...], whole: Spectrum) -> float:

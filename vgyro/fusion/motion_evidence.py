@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -58,6 +59,14 @@ class Spectrum:
         arrays = {name: getattr(self, name)[part] for name in ("frequency", "power", "noise", "weight")}
         return replace(self, **arrays)
 
+    def without(self, bands: Sequence[tuple[float, float]]) -> Spectrum:
+        """But for lines in these bands, from and to, Hz."""
+        keep = np.ones(len(self.frequency), dtype=bool)
+        for low, high in bands:
+            keep &= (self.frequency < low) | (self.frequency > high)
+        arrays = {name: getattr(self, name)[keep] for name in ("frequency", "power", "noise", "weight")}
+        return replace(self, **arrays)
+
     def bands(self) -> Spectrum:
         """Means over bands of equal width on the logarithm of the frequency, where they hold more than one line."""
         place = np.floor(np.log2(self.frequency / self.frequency[0]) * PER_OCTAVE)
@@ -111,7 +120,9 @@ def gather(
     """The pieces of a recording on which models are compared.  raises : DataError, TooShort"""
     z, r = np.asarray(z, dtype=float), np.asarray(r, dtype=float)
     told = np.broadcast_to(np.isfinite(r), z.shape)
-    runs = _runs(segment, moving, told)
+    if moving is not None:
+        told = told & np.asarray(moving, dtype=bool)
+    runs = _runs(segment, told)
     total = sum(stop - start for start, stop in runs)
     if total < SHORTEST:
         raise TooShort(f"{total} samples that say anything in stretches of {SHORTEST} or more", remedy="record longer")
@@ -141,16 +152,12 @@ def _spikes(z: np.ndarray, r: np.ndarray) -> np.ndarray:
     return spikes
 
 
-def _runs(segment: np.ndarray, moving: np.ndarray | None, told: np.ndarray) -> list[tuple[int, int]]:
-    """First sample and last + 1 of the stretches in which all samples count; both ends say something."""
-    counts = told if moving is None else told & np.asarray(moving, dtype=bool)
-    places = np.flatnonzero(counts)
+def _runs(segment: np.ndarray, told: np.ndarray) -> list[tuple[int, int]]:
+    """First sample and last + 1 of the stretches without long holes; both ends say something."""
+    places = np.flatnonzero(told)
     if len(places) == 0:
         return []
-    number = np.cumsum(np.diff(segment, prepend=segment[0]) != 0)
-    if moving is not None:
-        number = number + np.cumsum(np.diff(np.asarray(moving, dtype=np.int8), prepend=0) != 0)
-    apart = (np.diff(places) > FILLED + 1) | (np.diff(number[places]) != 0)
+    apart = (np.diff(places) > FILLED + 1) | (np.diff(np.asarray(segment)[places]) != 0)
     edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(places)]
     runs = [(int(places[first]), int(places[last - 1]) + 1) for first, last in pairwise(edges)]
     return [(start, stop) for start, stop in runs if stop - start >= SHORTEST]

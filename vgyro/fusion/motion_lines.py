@@ -13,6 +13,7 @@ from vgyro.fusion.motion_models import Line
 
 SHARP = 4
 """Lines of a periodogram over which its taper spreads a sinusoid."""
+SKIRT = 8.0
 SHARE, NEARLY_ALL = 0.1, 0.9
 NEIGHBOURS = 13
 """Bands whose median is the spectrum without lines: half an octave."""
@@ -33,6 +34,10 @@ class Peak:
     sd: float
     gain: float
     sharp: bool
+
+    def band(self) -> tuple[float, float]:
+        """From and to, Hz, with the skirts of the taper."""
+        return self.frequency_hz - SKIRT * self.width_hz, self.frequency_hz + SKIRT * self.width_hz
 
     def line(self) -> Line:
         """With the density of the peak: an oscillation of damping ζ is 2ζf wide."""
@@ -70,7 +75,7 @@ def peak(spectrum: Spectrum, signal: np.ndarray) -> Peak:
         found.append((float(inside[first]), first, size))
         size *= 2
     most = max(found)[0]
-    _, first, size = next(one for one in found if one[0] >= SHARE * most)
+    _, first, size = next(one for one in found if one[0] >= min(SHARE * most, most))
     part = slice(max(first - 2 * size, 0), first + 3 * size)
     sharp = size <= SHARP * spectrum.pieces
     above = np.maximum(spectrum.power[part] - signal[part] - spectrum.noise[part], 0.0)

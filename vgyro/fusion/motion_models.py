@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -307,15 +307,21 @@ class SteadyGain:
         noise = self.r * (1.0 - self.phi**2) / np.abs(1.0 - self.phi / turn) ** 2
         return signal / (signal + noise)
 
+    def without_lines(self) -> SteadyGain:
+        return replace(self, motion=replace(self.motion, lines=()))
+
     @property
     def random_walk_ratio(self) -> float | None:
         """Q/r of a random walk in white noise, whose gain has closed forms; None of any other."""
-        if self.motion.model != "random_walk" or self.phi or self.motion.lines:
+        if self.motion.model != "random_walk" or self.phi:
             return None
         return self.motion.parameters["q"] / self.motion.rate_hz / self.r
 
     def bandwidth_hz(self) -> float:
-        """Highest frequency at which G is √½ (-3 dB); NaN: it is above that up to half the sample rate; 0: never is."""
+        """Highest frequency at which G is √½ (-3 dB), but for lines.
+
+        NaN: it is above that up to half the sample rate; 0: never is.
+        """
         from scipy.optimize import brentq
 
         ratio = self.random_walk_ratio
@@ -323,23 +329,24 @@ class SteadyGain:
             square = 0.25 * ratio * (math.sqrt(2.0) - 1.0)
             return self.motion.rate_hz / math.pi * math.asin(math.sqrt(square)) if square < 1.0 else math.nan
         frequency = self.frequencies()
-        above = np.flatnonzero(self.at(frequency) >= HALF_POWER)
+        bare = self.without_lines()
+        above = np.flatnonzero(bare.at(frequency) >= HALF_POWER)
         if above.size == 0:
             return 0.0
         last = int(above[-1])
         if last == len(frequency) - 1:
             return math.nan
         edges = np.log(frequency[last : last + 2]).tolist()
-        return math.exp(brentq(lambda log: float(self.at(np.exp([log]))[0]) - HALF_POWER, *edges, xtol=1e-12))
+        return math.exp(brentq(lambda log: float(bare.at(np.exp([log]))[0]) - HALF_POWER, *edges, xtol=1e-12))
 
     def noise_bandwidth_hz(self) -> float:
-        """∫ G² df from 0 to half the sample rate: of white noise r, 2·(this)/rate_hz·r is left."""
+        """∫ G² df from 0 to half the sample rate, but for lines: of white noise r, 2·(this)/rate_hz·r is left."""
         ratio, half = self.random_walk_ratio, 0.5 * self.motion.rate_hz
         if ratio is not None:
             keep = random_walk_keep(ratio)
             return half * (1.0 - keep) * (1.0 + keep**2) / (1.0 + keep) ** 3
         frequency = self.frequencies()
-        gain = self.at(frequency)
+        gain = self.without_lines().at(frequency)
         return float(np.trapezoid(gain**2, frequency) + gain[0] ** 2 * frequency[0])
 
     def frequencies(self) -> np.ndarray:

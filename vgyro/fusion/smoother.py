@@ -104,7 +104,7 @@ def smooth(
         broken = int(np.argmin(variance > 0.0))
         raise DataError(f"the smoother breaks down: {motion.text}", f"sample {broken}", "choose another motion model")
     plain = activity is None and not phi and not standing
-    low_pass = motion.model == "random_walk" and plain and (r.ndim == 0 or bool(np.all(r == r[0])))
+    low_pass = motion.model == "random_walk" and not motion.lines and plain and (r.ndim == 0 or bool(np.all(r == r[0])))
     text = motion.text + (f"; {activity.text}" if activity is not None else "")
     text += f"; at rest {rest.text}" if standing and rest is not None else ""
     if phi:
