@@ -16,6 +16,7 @@ from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.missing import unseen
 from vgyro.fusion.motion_models import Motion
+from vgyro.fusion.motion_shared import shared_lines
 from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.parity_dcc import prefer_dcc
 from vgyro.fusion.prepared import prepared
@@ -92,6 +93,7 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
         return choose_motion(
             known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
             parameters.motion_models, parameters.engine, moving,
+            shared_lines(known.array.rate, array.segment, array.rate_hz),
         )  # fmt: skip
 
     return array.once(("motion", parameters), choose)

@@ -8,7 +8,7 @@ smoother is the first-order low-pass of `bandwidth_hz`, run forward and back.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.conditional import conditional
 from vgyro.fusion.fixed import median
+from vgyro.fusion.motion_choice import AtRest, beside_fixed
 from vgyro.fusion.motion_models import Activity, Motion
+from vgyro.fusion.motion_shared import shared_lines
 from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, mean_variance, smooth
 
@@ -214,15 +216,32 @@ def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) ->
     """The smoother of a fixed bandwidth, and the variance [T] of what it gives where the noise changes."""
     mean = mean_variance(np.asarray(signal.variance))
     motion = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)
+    besides = shared_vibration(array, parameters)
+    motion = replace(motion, lines=besides.lines)
     result = smooth(signal.rate, mean, array.segment, array.rate_hz, motion, 0.0, parameters.engine)
     # Where no gyro says anything the rate at rest is that of the samples about it.
     told = np.where(np.isfinite(signal.variance), signal.variance, mean)
     share = np.broadcast_to(told / mean, array.segment.shape)
-    if math.isfinite(result.bandwidth_hz) and result.passes:
+    if math.isfinite(result.bandwidth_hz):
         # Far below the sensor's pole coloured noise is white noise of its long-run variance.
         colour = (1.0 + signal.colour) / (1.0 - signal.colour)
         share = colour * _around(array, share, result.bandwidth_hz, parameters.engine)
-    return result, result.variance * share
+    return result, result.variance * share + besides.lost
+
+
+def shared_vibration(array: ArrayRates, parameters: FilterParameters) -> AtRest:
+    """What moves in a recording at rest: from the best fused rate, for every row that is smoothed."""
+
+    def find() -> AtRest:
+        known = analysed(array, parameters)
+        mean = mean_variance(known.variance())
+        fixed = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)
+        return beside_fixed(
+            known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(), fixed,
+            shared_lines(known.array.rate, array.segment, array.rate_hz),
+        )  # fmt: skip
+
+    return array.once(("vibration", parameters), find)
 
 
 def _around(array: ArrayRates, values: np.ndarray, bandwidth_hz: float, engine: str) -> np.ndarray:
