@@ -172,6 +172,7 @@ class Gyro(StrictModel):
     scale: float = Field(gt=0, description="nominal scale, deg/s a count")
     bias: float = Field(0.0, description="nominal zero-rate output, counts")
     range_deg_s: float | None = Field(None, gt=0, description="measuring range, deg/s")
+    lowpass_hz: float | None = Field(None, gt=0, description="its own first-order low-pass, -3 dB, Hz; null: unknown")
 
 
 class Temperature(StrictModel):

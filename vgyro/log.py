@@ -87,6 +87,7 @@ class LogGyro(StrictModel):
     scale: float | None = Field(None, gt=0, description="nominal scale, deg/s a count; null: the column has a `unit`")
     bias: float = Field(0.0, description="nominal zero-rate output, counts")
     range_deg_s: float | None = Field(None, gt=0, description="measuring range, deg/s")
+    lowpass_hz: float | None = Field(None, gt=0, description="its own first-order low-pass, -3 dB, Hz; null: unknown")
 
     @model_validator(mode="after")
     def _unit_or_scale(self) -> LogGyro:
@@ -152,6 +153,7 @@ def board_of_log(array: LogArray, name: str, title: str) -> Board:
         "gyros": tuple(
             Gyro(
                 name=one.name, field=one.name, axis=one.axis, sign=one.sign, bias=one.bias, range_deg_s=one.range_deg_s,
+                lowpass_hz=one.lowpass_hz,
                 scale=one.scale or 1.0,
             )
             for one in array.gyros

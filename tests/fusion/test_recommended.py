@@ -12,9 +12,10 @@ import pytest
 from vgyro.fusion import METHODS, FilterParameters, SampleWeights
 from vgyro.fusion.analysed import DCC, analysed, shared_motion
 from vgyro.fusion.events import FaultEvent
+from vgyro.fusion.lowpass import pole_times
 from vgyro.fusion.parity import shared_variances
 from vgyro.fusion.recommended import static_weights
-from vgyro.fusion.smoothed import pole_time, without_pole
+from vgyro.fusion.smoothed import without_pole
 
 RATE_HZ = 200.0
 STILL = FilterParameters(bandwidth_hz=1.0)
@@ -118,7 +119,7 @@ def test_of_unequal_gyros_less_remains_than_of_the_average(make_array):
 def test_the_pole_of_the_sensors_is_undone(make_array):
     # Closed form: a sinusoid through 1/(1 + iωτ) lags by atan(ωτ); afterwards it does not.
     array = make_array(4000, [0.1, 0.1], rate_hz=500.0)
-    omega, tau = 2 * math.pi * 0.25, pole_time(math.exp(-2 * math.pi * 40 / 500), 1 / 500.0)
+    omega, tau = 2 * math.pi * 0.25, float(pole_times(np.array([math.exp(-2 * math.pi * 40 / 500)]), 1 / 500.0)[0])
     assert tau == pytest.approx(1 / (2 * math.pi * 40))
     time = np.arange(4000) / 500.0
     gain = 1 / (1 + 1j * omega * tau)
@@ -136,7 +137,10 @@ def test_recommended_has_no_delay_behind_a_pole(make_array):
     white = make_array(samples, [0.1] * 4, rate_hz=rate_hz).rate
     for t in range(1, samples):
         white[t] = keep * white[t - 1] + (1 - keep) * white[t]
-    array = replace(make_array(samples, [0.1] * 4, rate_hz=rate_hz, at_rest=False), rate=late[:, None] + white)
+    array = replace(
+        make_array(samples, [0.1] * 4, rate_hz=rate_hz, at_rest=False), rate=late[:, None] + white,
+        lowpass_hz=np.full(4, 40.0),
+    )  # fmt: skip
     slope = np.gradient(truth, 1 / rate_hz)
     delay = {}
     for name in ("parity_smoothed", "recommended"):

@@ -178,22 +178,6 @@ def test_the_common_bias_with_one_gyro_far_off():
     assert np.mean(ratios < 1.96**2) > 0.9
 
 
-@pytest.mark.parametrize("scale", [0.0, 0.01])
-def test_scale_errors_are_not_taken_for_biases(scale):
-    # Expected: the biases as they are known without motion of 20 deg/s r.m.s. about 0.4 Hz; 1 % of it is ten times the
-    # noise of a block.
-    shares = scale * np.array([1.0, -1.0, 0.5, -0.5, 1.5, -1.5])
-    array, bias = simulated(600, 3, np.full(6, 0.02), np.full(6, 2e-4))
-    motion = 28.0 * np.sin(np.arange(600) * 2.6)
-    turning = motion + 20.0 * np.sin(np.arange(600) / 3.0)
-    moved = replace(array, rate=array.rate + motion[:, None] + turning[:, None] * shares)
-    slow, still = (slow_errors(one, MOVING, np.full(6, 0.02) ** 2) for one in (moved, array))
-    assert ("scale errors of 1.1 % between gyros" in slow.note) == (scale > 0)
-    assert np.std((slow.bias - bias) @ EQUAL) < 0.004
-    np.testing.assert_allclose(slow.bias, still.bias, atol=1e-8 if scale == 0 else 0.004)
-    np.testing.assert_allclose(slow.covariance, still.covariance, rtol=0.2)
-
-
 def test_one_gyro_far_off_does_not_drag_the_rest():
     # Expected: the rate that the other five give without it, within their own s.d. of the common bias.
     array, bias = simulated(200, 2)

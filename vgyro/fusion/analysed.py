@@ -14,6 +14,7 @@ import numpy as np
 
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights
+from vgyro.fusion.lowpass import array_delay
 from vgyro.fusion.missing import unseen
 from vgyro.fusion.motion_models import Motion
 from vgyro.fusion.motion_shared import shared_lines
@@ -21,6 +22,7 @@ from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.parity_dcc import prefer_dcc
 from vgyro.fusion.prepared import prepared
 from vgyro.fusion.quantised import grid, lasting_of_mean, least_variance
+from vgyro.fusion.relative import Relative, relative_variance, smoothed
 from vgyro.fusion.slow import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.smoother import choose_motion
@@ -35,6 +37,8 @@ class Analysed:
     """What is known of a recording.
 
     array : as prepared;  variances : R_t;  weights : of least variance for it;  slow : b;  note : what was chosen
+    relative : answers of the gyros to the motion, taken off; None: not known
+    late_s : how late the array is, s, where that is known; 0: as late as its gyros
     guess : what is likely where no gyro says anything; None: there are no such samples, or nothing is known
     """
 
@@ -43,15 +47,29 @@ class Analysed:
     weights: SampleWeights
     slow: SlowErrors
     note: str
+    relative: Relative | None = None
+    late_s: float = 0.0
     guess: StandIn | None = None
 
     def rate(self) -> np.ndarray:
-        """u(t)'(y - b) [T], deg/s."""
+        """u(t)'(y - b) [T], deg/s, as late as the array is."""
         return combined_without(self.array, self.weights, self.slow)
+
+    def in_time(self, rate: np.ndarray) -> np.ndarray:
+        """The rate [T] without the array's delay, where it is known: late by little against the motion's time."""
+        if not self.late_s or self.relative is None:
+            return rate
+        return rate + self.late_s * smoothed(self.array, rate, self.relative.window, 1)
 
     def variance(self) -> np.ndarray:
         """Variance u'R_t·u of its white noise [T], (deg/s)² a sample; infinite where no gyro says anything."""
         return self.at_samples(self.variances.combined_variance())
+
+    def answer_variance(self, weights: np.ndarray) -> np.ndarray | float:
+        """Variance [T], (deg/s)², of what scale factors, delays and poles leave in the rate; weights [M, N]."""
+        if self.relative is None:
+            return 0.0
+        return relative_variance(self.array, self.relative, self.variances.shares @ weights / len(self.array.rate))
 
     def at_samples(self, variance: np.ndarray) -> np.ndarray:
         """Variances [M] of the blocks at the samples [T]; infinite where no gyro says anything."""
@@ -93,7 +111,7 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
         return choose_motion(
             known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
             parameters.motion_models, parameters.engine, moving,
-            shared_lines(known.array.rate, array.segment, array.rate_hz),
+            shared_lines(known.array.rate, array.segment, array.rate_hz), parameters.has("lines"),
         )  # fmt: skip
 
     return array.once(("motion", parameters), choose)
@@ -111,10 +129,21 @@ def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
     white = blocks.mean_of(variances.start, lasting)
     white[blocks.mean_of(variances.start, variances.excluded.astype(float)) > 0] = np.inf
     slow = slow_errors(array, parameters, white, variances.correlation, blocks)
+    late, of_delay = _late(array, parameters, ready.relative, variances.phi)
     left_out = f"{len(array.faults)} faults left out" if array.faults else ""
-    notes = [*ready.notes, variances.note, score.note, slow.note, left_out]
+    notes = [*ready.notes, variances.note, score.note, slow.note, of_delay, left_out]
     weights = variances.sample_weights(parameters.engine)
-    return Analysed(array, variances, weights, slow, "; ".join(note for note in notes if note), ready.guess)
+    note = "; ".join(one for one in notes if one)
+    return Analysed(array, variances, weights, slow, note, ready.relative, late, ready.guess)
+
+
+def _late(
+    array: ArrayRates, parameters: FilterParameters, relative: Relative | None, phi: np.ndarray
+) -> tuple[float, str]:  # fmt: skip
+    if not parameters.has("pole"):
+        return 0.0, ""
+    declared = np.full(len(phi), np.nan) if array.lowpass_hz is None else array.lowpass_hz
+    return array_delay(relative, phi, array.period, declared)
 
 
 def _not_below(variances: Variances, step: np.ndarray) -> Variances:

@@ -98,6 +98,7 @@ class ArrayRates:
     stretch_time : [S] s, time of the first sample of each gap-free stretch; None: they follow without time between
     missing    : [T, N] of bool, samples without a value, for which `rate` holds what vgyro.fusion.missing filled in;
                  None: there are none
+    lowpass_hz : [N] Hz, -3 dB frequency of each gyro's own first-order low-pass (data sheet); NaN or None: unknown
     """
 
     rate: np.ndarray
@@ -112,6 +113,7 @@ class ArrayRates:
     temperature: np.ndarray | None = None
     stretch_time: np.ndarray | None = None
     missing: np.ndarray | None = None
+    lowpass_hz: np.ndarray | None = None
     _made: dict[Hashable, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:

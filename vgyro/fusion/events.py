@@ -8,10 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-FaultKind = Literal["drift", "step", "noise", "burst", "stuck", "dropout", "scale"]
-FAULT_KINDS: tuple[FaultKind, ...] = ("drift", "step", "noise", "burst", "stuck", "dropout", "scale")
+FaultKind = Literal[
+    "drift", "step", "noise", "burst", "stuck", "dropout", "scale", "dead", "copy", "outlier", "clipped"
+]
+FAULT_KINDS: tuple[FaultKind, ...] = (
+    "drift", "step", "noise", "burst", "stuck", "dropout", "scale", "dead", "copy", "outlier", "clipped",
+)  # fmt: skip
 """drift: the bias leaves its random walk; step: at once; noise: more of it, for long; burst: for a short time;
-stuck: one value is repeated; dropout: zero or nothing; scale: the sensitivity changes (seen in motion only)."""
+stuck: one value is repeated; dropout: zero or nothing; scale: the sensitivity changes (seen in motion only);
+dead: nothing of the motion is in its rate; copy: its samples are those of another gyro; outlier: a few samples are
+absurd; clipped: its range ends where the other gyros go on."""
 
 
 @dataclass(frozen=True)
@@ -19,9 +25,10 @@ class FaultEvent:
     """One gyro at fault over samples [start, stop) of the recording.
 
     gyro     : place in the array, from 0
-    evidence : size over its standard error, σ; infinite for stuck and dropout
-    size     : in `unit`: deg/s of a drift (greatest) or step, ratio of the noise, ratio of the scale minus 1;
-               NaN for stuck and dropout
+    evidence : size over its standard error, σ; infinite where the values alone show it (stuck, dropout, copy, clipped)
+    size     : in `unit`: deg/s of a drift (greatest), step or outlier (greatest), ratio of the noise, ratio of the
+               scale minus 1, deg/s of the end of the range; NaN for stuck, dropout and copy
+    other    : place of the gyro that a copy repeats; None: of another kind
     """
 
     gyro: int
@@ -31,6 +38,7 @@ class FaultEvent:
     evidence: float
     size: float
     unit: str
+    other: int | None = None
 
     def within(self, first: int, last: int) -> FaultEvent:
         """The part of it in samples [first, last), counted from `first`."""
@@ -38,10 +46,14 @@ class FaultEvent:
 
 
 def excluded(events: Iterable[FaultEvent], samples: int, gyros: int) -> list[np.ndarray]:
-    """Stretches [M, 2] of samples in which each gyro is at fault, in order and without overlap: one array a gyro."""
+    """Stretches [M, 2] of samples in which each gyro is at fault, in order and without overlap: one array a gyro.
+
+    A gyro that clips is right between the ends of its range: vgyro.fusion.clipped finds the samples that are not.
+    """
     found = []
+    at_fault = [one for one in events if one.kind != "clipped"]
     for gyro in range(gyros):
-        spans = sorted((max(one.start, 0), min(one.stop, samples)) for one in events if one.gyro == gyro)
+        spans = sorted((max(one.start, 0), min(one.stop, samples)) for one in at_fault if one.gyro == gyro)
         merged: list[list[int]] = []
         for start, stop in spans:
             if stop <= start:

@@ -9,6 +9,7 @@ closed form in the spectrum of the fused rate (vgyro.fusion.motion_evidence).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,7 +19,6 @@ from vgyro import engine as engines
 from vgyro.config import MOTION_MODELS
 from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError, EngineError
-from vgyro.fusion.motion_calibration import calibration, lost
 from vgyro.fusion.motion_evidence import Piece, Spectrum, gather, spectrum
 from vgyro.fusion.motion_lines import fine_bands, peak, single, sinusoid, without_peaks
 from vgyro.fusion.motion_models import UNLIMITED, Candidate, Line, Motion
@@ -31,6 +31,8 @@ WIDE = 0.1
 """Damping of an oscillation that is no line of a board at rest."""
 AROUND = 1.2
 """Whether a line has a width is seen from the spectrum within this factor of its frequency."""
+SURE = 4.0
+"""Standard errors above which there is motion that is not passed."""
 SPENT = 4.0
 """Risk of the amplitude and the phase of a sinusoid, both passed as they are."""
 CHECKED = 1 << 14
@@ -66,24 +68,31 @@ def choose_motion(
     engine: str = "native",
     moving: np.ndarray | None = None,
     shared: Callable[[float], bool] | None = None,
+    lines: bool = True,
 ) -> Motion:
     """The model of the rate whose smoother has the least estimated error.
 
     z, r, segment, rate_hz, phi : as in vgyro.fusion.smoother.smooth;  moving : [T] bool, only these samples count
-    models : names of those to choose from;  shared : whether a line at a frequency, Hz, is motion; None: all are
+    models : names of those to choose from;  lines : look for them
+    shared : whether a line at a frequency, Hz, is motion; None: all are
     A constant rate is a legal answer, q = 0, and so is no smoothing, `none`. Lines that stand in the spectrum of z are
     motion: sinusoids, or with a width. A model whose smoother breaks down is left out.
     raises : DataError if the samples do not change, or if r is not above zero; TooShort
     """
     pieces = gather(z, r, segment, rate_hz, phi, moving)
-    found = _best(pieces, rate_hz, _families(models), shared)
+    families = _families(models)
+    found = (
+        _best(pieces, rate_hz, families, shared)
+        if lines
+        else _compared(Found(pieces, spectrum(pieces, rate_hz)), families)
+    )
     rows = tuple(
         Candidate(*_named(fit, found.sinusoids, models), fit.risk + found.spent, fit.cost + found.spent)
         for fit in found.fits
     )
     z, r, free = np.asarray(z, dtype=float), np.asarray(r, dtype=float), float(found.bands.weight.sum())
-    for fit, row in zip(found.fits, rows, strict=True):
-        motion = Motion(row.model, row.parameters, rate_hz, rows, calibration(found.bands, fit.signal), row.lines)
+    for row in rows:
+        motion = Motion(row.model, row.parameters, rate_hz, rows, lines=row.lines)
         if row.cost < free and _stands(motion, z, r, phi, found.pieces, engine):
             return motion
     return Motion(UNLIMITED, {}, rate_hz, rows)
@@ -200,7 +209,7 @@ def beside_fixed(
     found = _lines(pieces, whole, bare, shared)
     lines = tuple(line for line in found.lines if line.damping < WIDE)
     rest = fine_bands(found.whole, [line.frequency_hz for line in lines])
-    return AtRest((*found.sinusoids, *lines), lost(rest, signal_of(rest, bare, lines)))
+    return AtRest((*found.sinusoids, *lines), _lost(rest, signal_of(rest, bare, lines)))
 
 
 def _bare(bands: Spectrum) -> Fit:
@@ -248,3 +257,16 @@ def _stands(motion: Motion, z: np.ndarray, r: np.ndarray, phi: float, pieces: li
         return False
     left = (own[told] - smoothed[told]) ** 2 + 2.0 * variance[told]
     return bool(float(np.mean(left / noise[told])) < 2.0)
+
+
+def _lost(spectrum: Spectrum, signal: np.ndarray) -> float:
+    """Variance of the motion that the smoother takes away, (deg/s)²: ∫ (1 - H)²·(S_z - S_v), as far as it is certain.
+
+    signal : S [F], which makes the smoother and need not be the density of the motion
+    Zero within SURE standard errors.
+    """
+    H = signal / (signal + spectrum.noise)
+    share = (1.0 - H) ** 2 * spectrum.weight / float(spectrum.weight.sum()) * spectrum.rate_hz
+    mean = float(share @ (spectrum.power - spectrum.noise))
+    error = math.sqrt(2.0 * float((share * spectrum.noise) ** 2 @ (1.0 / spectrum.weight)))
+    return mean if mean > SURE * error else 0.0

@@ -69,7 +69,7 @@ class Motion:
                  markov: tau_s, sd (deg/s)
     rate_hz    : of the samples
     table      : the models that it was chosen from
-    calibration : what the variance of the smoothed rate is multiplied by, from the spectrum of the residual
+    calibration : what the variance of the smoothed rate is multiplied by
     lines      : that the rate has besides
     """
 

@@ -28,8 +28,6 @@ from vgyro.fusion.weights import min_variance_weights
 FEWEST_BLOCKS = 16
 SMALLEST_EIGENVALUE = 1e-3
 """A correlation matrix with a smaller one is too near to singular to weight by."""
-LEAST_PART = 0.02
-"""A gyro with less than this share of the variance of the combination does not count in it."""
 
 
 @dataclass(frozen=True)
@@ -102,10 +100,6 @@ class Variances:
     def colour(self, weights: np.ndarray | None = None) -> float:
         """φ of the combination: mean of the gyros', by their shares u_i²σ_i² of its variance."""
         return float(self._parts(weights) @ self.phi)
-
-    def all_coloured(self, weights: np.ndarray | None = None) -> bool:
-        """Has the noise of every gyro that counts in the combination a colour?"""
-        return bool((self.phi[self._parts(weights) > LEAST_PART] > 0.0).all())
 
     def _parts(self, weights: np.ndarray | None) -> np.ndarray:
         """Shares [N] of the gyros in the variance of the combination, of Σ = 1, correlations left out."""

@@ -18,8 +18,7 @@ PARTS: dict[str, str] = {
     "temperature": "slow errors that follow the temperature",
     "anchors": "standstill pins the common bias",
     "band": "variances of the band that passes",
-    "risk": "the motion's parameters by the smoother's own error, after their likelihood",
-    "calibration": "the posterior variance is scaled by what the spectrum leaves over",
+    "lines": "vibrations are motion",
     "activity": "motion that comes and goes",
     "guard": "the average, where the recording itself shows it to be better",
 }

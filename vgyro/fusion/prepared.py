@@ -14,8 +14,12 @@ from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.clipped import without_clipped
 from vgyro.fusion.missing import unseen
 from vgyro.fusion.quantised import grid, with_grid
+from vgyro.fusion.relative import Relative, without_relative
 from vgyro.fusion.tails import without_tails
 from vgyro.fusion.unseen import StandIn, stand_in
+
+MENDED = {"clipped": "clipped", "outlier": "tails"}
+"""Faults of single samples, and the parts that mend them: the rest of the stretch is as good as any."""
 
 
 @dataclass(frozen=True)
@@ -23,22 +27,20 @@ class Prepared:
     """The rates made ready.
 
     array : as the methods take it;  notes : what was found;  step : of each gyro's values [N], deg/s, 0: none
+    relative : answers of the gyros to the motion, taken off; None: not looked for, or the motion is too small
     guess : in motion, what is likely where no gyro says anything; None: there are no such samples
     """
 
     array: ArrayRates
     step: np.ndarray
     notes: tuple[str, ...] = ()
+    relative: Relative | None = None
     guess: StandIn | None = None
 
 
 def prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
     """Made once for all methods that need it."""
     return array.once(("prepared", parameters), lambda: _prepared(array, parameters))
-
-
-MENDED = {"clipped": "clipped", "outlier": "tails"}
-"""Faults of single samples, and the parts that mend them: the rest of the stretch is as good as any."""
 
 
 def _prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
@@ -52,9 +54,13 @@ def _prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
     if parameters.has("clipped"):
         array, note = without_clipped(array)
         notes.append(note)
+    relative = None
+    if parameters.has("response") and parameters.in_motion:
+        array, relative, note = without_relative(array)
+        notes.append(note)
     if parameters.has("tails"):
         array, note = without_tails(array, step)
         notes.append(note)
     array = with_grid(array, known)
     guess = stand_in(array, lost) if parameters.in_motion else None
-    return Prepared(array, step, tuple(filter(None, notes)), guess)
+    return Prepared(array, step, tuple(filter(None, notes)), relative, guess)

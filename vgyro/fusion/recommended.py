@@ -5,7 +5,8 @@
 3. u = minimum-variance weights of R_t;  z = u'(y - b).
 4. The motion: model and parameters by likelihood, two-sided smoother of z with u'R_t·u (vgyro.fusion.smoother).
    Where the colours of the gyros' noise differ, R_t is scaled to the band that it passes (vgyro.fusion.parity_band).
-5. The sensor's low-pass, where parity shows its colour in the noise of all gyros, is undone on the smoothed rate.
+5. The array's delay by its sensors' low-pass, where it is declared or the motion shows it, is undone
+   (vgyro.fusion.lowpass).
 
 The posterior variance of a sample is that of 4 plus that of u'(b - its estimate) of 2.
 """
@@ -13,6 +14,7 @@ The posterior variance of a sample is that of 4 plus that of u'(b - its estimate
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,8 +43,9 @@ def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
         known.variances.colour(shares),
         weights,
         "; ".join(filter(None, [known.note, note])),
-        known.at_least(known.slow.at_samples(slow_variance(weights, known.slow)), shares, parameters),
-        undo_pole=known.variances.all_coloured(shares),
+        known.at_least(known.slow.at_samples(slow_variance(weights, known.slow)), shares, parameters)
+        + known.answer_variance(shares),
+        late_s=known.late_s,
     )
     return smoothed(array, parameters, signal)
 
@@ -64,7 +67,7 @@ def passed_hz(array: ArrayRates, parameters: FilterParameters, known: Analysed) 
 def recommended_unsmoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """The same without a model of the motion: u(t)'(y - b), full bandwidth, no delay."""
     known = analysed(array, parameters)
-    return Fused.undelayed(known.rate(), known.weights, known.note)
+    return replace(Fused.undelayed(known.in_time(known.rate()), known.weights, known.note), delay_s=-known.late_s)
 
 
 def static_weights(array: ArrayRates, parameters: FilterParameters) -> np.ndarray:

@@ -31,7 +31,9 @@ UNSURE = 4.0
 SURE = 0.05
 """The neighbours' prediction is never better than this part of the variance of the gyros' own combination."""
 FAR = 25.0
-"""A square so many times the usual one counts as that much in the variance of the predictions."""
+"""A square so many times the usual one is far off."""
+ENOUGH = 4096
+"""Samples that a median over time is taken of, about."""
 NOTHING = 1e12
 """Variance of a prediction that is none, over that of the gyros."""
 MAD = 1.4826
@@ -103,31 +105,31 @@ def _median(values: np.ndarray) -> float:
 
 
 def start(look: Look, setting: Setting) -> Local:
-    """Where the rounds begin: at the median of the gyros that are used, or of all where none is."""
+    """Where the rounds begin: at the middle of the gyros."""
     centre = np.repeat(setting.offset[:, None], look.values.shape[1], axis=1)
     size = np.repeat(setting.usual[:, None], look.values.shape[1], axis=1)
+    rate = _middle(look, centre)
+    own = np.full(len(rate), 1.0 / np.sum(setting.usual**-2.0))
+    return Local(rate, own, rate, own, centre, size, look.values - centre - rate)
+
+
+def _middle(look: Look, centre: np.ndarray) -> np.ndarray:
+    """Median [n] of the gyros that are used, or of all where none is."""
     values = look.values - centre
     if look.used.all():
-        rate = np.median(values, axis=0)
-    else:
-        rate = np.nanmedian(np.where(look.used | ~look.used.any(axis=0), values, np.nan), axis=0)
-    own = np.full(len(rate), 1.0 / np.sum(setting.usual**-2.0))
-    return Local(rate, own, rate, own, centre, size, values - rate)
+        return np.asarray(np.median(values, axis=0))
+    return np.asarray(np.nanmedian(np.where(look.used | ~look.used.any(axis=0), values, np.nan), axis=0))
 
 
 def improved(look: Look, setting: Setting, local: Local) -> Local:
-    """One more round: the rate given the sizes, and these given the rate."""
-    precision = np.zeros_like(look.values)
-    for gyro, density in enumerate(setting.densities):
-        used, size = look.used[gyro], local.size[gyro]
-        square = (local.residual[gyro] ** 2 + np.where(used, local.variance, 0.0)) / size**2
-        precision[gyro] = np.where(used, density.weight(square) / size**2, 0.0)
+    """One more round: the rate by the gyros, then with the neighbours; offsets and sizes given the rate."""
+    precision = _precision(look, setting, local.size, local.residual, local.variance)
     total = precision.sum(axis=0)
     seen = total > 0
     own = np.divide(1.0, total, out=np.full(len(total), np.inf), where=seen)
     mean = np.sum(precision * (look.values - local.centre), axis=0)
     alone = np.where(seen, mean / np.where(seen, total, 1.0), local.rate)
-    rate, variance = _with_neighbours(look, alone, own, setting)
+    rate, variance = _with_neighbours(look, alone, own, setting, local)
     known = np.where(seen, variance, 0.0)
     parts = [
         _of_gyro(gyro, look, setting, precision[gyro], rate, known * look.used[gyro], local.size[gyro])
@@ -135,6 +137,18 @@ def improved(look: Look, setting: Setting, local: Local) -> Local:
     ]
     centre, size, residual = (np.stack(one) for one in zip(*parts, strict=True))
     return Local(rate, variance, alone, own, centre, size, residual)
+
+
+def _precision(
+    look: Look, setting: Setting, size: np.ndarray, residual: np.ndarray, variance: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """What each sample counts [N, n], 1/(deg/s)², by its residual [N, n] from a rate of some variance [n]."""
+    precision = np.zeros_like(size)
+    for gyro, density in enumerate(setting.densities):
+        used = look.used[gyro]
+        square = (residual[gyro] ** 2 + np.where(used, variance, 0.0)) / size[gyro] ** 2
+        precision[gyro] = np.where(used, density.weight(square) / size[gyro] ** 2, 0.0)
+    return precision
 
 
 def _of_gyro(
@@ -164,20 +178,51 @@ def mean_log_variance(look: Look, local: Local, setting: Setting, reach: int) ->
     return float(np.mean(np.log(extra[told] / _usual(local.own)))) if told.any() else float("nan")
 
 
-def _with_neighbours(look: Look, alone: np.ndarray, own: np.ndarray, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+def _with_neighbours(
+    look: Look, alone: np.ndarray, own: np.ndarray, setting: Setting, before: Local
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Mean and variance [n] of the rate from the gyros and from the samples before and after."""
     reach = setting.reach
     if not reach or len(alone) <= 2 * reach:
         return alone, own
     predicted = _predicted(alone, own, reach)
     extra = _extra(predicted - alone, own, setting.size)
-    extra[_near(look.borders, len(alone), reach)] = NOTHING * _usual(own)
+    jumped = _jumped(look, predicted - alone, predicted, extra, own, setting, before)
+    extra[jumped | _near(look.borders, len(alone), reach)] = NOTHING * _usual(own)
     variance = 1.0 / (1.0 / own + 1.0 / extra)
     return variance * (alone / own + predicted / extra), variance
 
 
+def _jumped(
+    look: Look, off: np.ndarray, predicted: np.ndarray, extra: np.ndarray, own: np.ndarray, setting: Setting,
+    before: Local,
+) -> np.ndarray:  # fmt: skip
+    """Samples [n] at which the gyros together are FAR from what the others predict;  off : how far they seem to be.
+
+    What they say together is asked for without the prediction. Where they do not agree they say little, and no jump is
+    seen.
+    """
+    jumped = np.zeros(len(off), dtype=bool)
+    places = np.flatnonzero(off**2 > 0.25 * FAR * (_usual(own) + extra))
+    if places.size:
+        some = Look(look.values[:, places], look.used[:, places], np.empty(0, dtype=np.int64))
+        centre, size = before.centre[:, places], before.size[:, places]
+        middle = _middle(some, centre)
+        precision = _precision(some, setting, size, some.values - centre - middle, before.own[places])
+        # The gyro in the middle agrees with itself.
+        told = precision.sum(axis=0) - precision.max(axis=0)
+        jumped[places] = (middle - predicted[places]) ** 2 * told > FAR * (1.0 + extra[places] * told)
+    return jumped
+
+
 def _usual(own: np.ndarray) -> float:
-    return _median(own[np.isfinite(own)]) or 1.0
+    some = _some(own)
+    return _median(some[np.isfinite(some)]) or 1.0
+
+
+def _some(values: np.ndarray) -> np.ndarray:
+    """Enough of them for a median."""
+    return values[:: 1 + len(values) // ENOUGH]
 
 
 def _predicted(alone: np.ndarray, own: np.ndarray, reach: int) -> np.ndarray:
@@ -202,7 +247,7 @@ def _kernel(reach: int) -> np.ndarray:
 def _extra(left: np.ndarray, own: np.ndarray, window: int) -> np.ndarray:
     """Variance [n] of a prediction about each place, from how far off it is [n]: with the sample's own taken off."""
     usual = np.minimum(own, UNSURE * _usual(own))
-    square = np.minimum(left**2, FAR * np.maximum(np.median(left**2), usual))
+    square = np.minimum(left**2, FAR * np.maximum(np.median(_some(left**2)), usual))
     count = box(np.ones(len(left)), window)
     return np.maximum(box(square - usual, window), SURE * box(usual, window)) / count
 
@@ -217,6 +262,6 @@ def _near(borders: np.ndarray, samples: int, reach: int) -> np.ndarray:
 
 def box(values: np.ndarray, length: int) -> np.ndarray:
     """Sums [n] of values [n] over `length` samples about each, fewer at the ends."""
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    low = np.arange(len(values)) - length // 2
-    return total[np.minimum(low + length, len(values))] - total[np.maximum(low, 0)]
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(values, length, mode="constant")) * length

@@ -14,7 +14,7 @@ SMALLEST = 0.25
 """κ of the smallest component; the others follow in steps of √2."""
 APART = 4.0
 """Least κ of samples far off beside a normal density."""
-ROUNDS = 1000
+ROUNDS = 300
 LEAST_SHARE = 1e-12
 """Smaller components are none."""
 

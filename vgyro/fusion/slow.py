@@ -106,7 +106,7 @@ def slow_errors(
     choice = choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk)
     constants = empirical_prior(evidence, choice.filtered).posterior(choice.filtered)
     state, covariance = run_smoother(choice.information, choice.filtered)
-    design = evidence.of_biases
+    design = evidence.design
     constant_rate = choice.slopes and bool(array.at_rest.all())
     if constant_rate:
         so_far, _ = _with_constants(state, covariance, constants, design)
@@ -119,7 +119,6 @@ def slow_errors(
     parts = (
         why,
         why_not,
-        _of_scale(evidence, constants),
         _of_walk(array, choice.walk),
         _of_temperature(choice, evidence.anchored, constant_rate),
     )
@@ -175,13 +174,6 @@ def _temperature(array: ArrayRates, parameters: FilterParameters, blocks: SlowBl
     if span <= LEAST_RANGE:
         return None, f"temperature within {span:.2g} K: not regressed on"
     return degrees, ""
-
-
-def _of_scale(evidence: Evidence, constants: Constants) -> str:
-    if not evidence.scales:
-        return ""
-    found = constants.mean[evidence.plain - evidence.scales : evidence.plain]
-    return f"scale errors of {100.0 * float(np.std(found)):.2g} % between gyros are told from biases, and left in"
 
 
 def _of_walk(array: ArrayRates, walk: Walk) -> str:

@@ -18,7 +18,6 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_scale import scale_variance
 from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filters
 
 
@@ -49,10 +48,8 @@ class Evidence:
 
     means  : [B, N], deg/s, less `shared` [B], their mean where the board may move
     weight : G [B, N, N];  total : R⁻¹1 [B, N];  time : [B] s
-    design : D [B, N, k] of the constants: the N biases, E steps after faults and the N scale errors if they show, and
-             the N temperature slopes if any
-    steps  : variances beforehand of the steps, (deg/s)², and of the scale errors
-    scales : number of the scale errors, N or 0
+    design : D [B, N, k] of the constants: the N biases, E steps after faults, and the N temperature slopes if any
+    steps  : variances beforehand of the steps, (deg/s)²
     walks  : correlation [N, N] of the random walks
     anchored : standstill makes the common part seen in some of the blocks
     """
@@ -64,7 +61,6 @@ class Evidence:
     time: np.ndarray
     design: np.ndarray
     steps: np.ndarray
-    scales: int
     walks: np.ndarray
     anchored: bool
 
@@ -95,12 +91,8 @@ class Evidence:
         shared = np.where(resting, 0.0, means.mean(axis=1))
         means -= shared[:, None]
         steps = blocks.steps(array)
-        rate = np.where(parity, shared + np.sum(total * means, axis=1) / np.where(parity, total.sum(axis=1), 1.0), 0.0)
-        same = (np.diff(blocks.stretch) == 0) & parity[1:] & parity[:-1] & ~array.at_rest.all()
-        scale = scale_variance(means, weight, total, np.flatnonzero(same) + 1, rate)
-        scales = means.shape[1] if scale > 0 else 0
-        design = _design(len(blocks), means.shape[1], steps, rate if scales else None, temperature)
-        sizes = np.array([size**2 for _, _, size in steps] + [scale] * scales)
+        design = _design(len(blocks), means.shape[1], steps, temperature)
+        sizes = np.array([size**2 for _, _, size in steps])
         return cls(
             means,
             shared,
@@ -109,7 +101,6 @@ class Evidence:
             blocks.time,
             design,
             sizes,
-            scales,
             array.noise.correlation,
             bool(resting.any()),
         )
@@ -133,15 +124,8 @@ class Evidence:
     def unseen(self) -> np.ndarray:
         """Rows of Filtered.squares of the gyros that no block uses: at fault throughout, or without any value."""
         gone = np.flatnonzero(~(self.weight != 0).any(axis=(0, 2)))
-        starts = [0, *([self.plain - self.scales] if self.scales else []), *([self.plain] if self.has_slopes else [])]
+        starts = [0, *([self.plain] if self.has_slopes else [])]
         return np.concatenate([1 + start + gone for start in starts])
-
-    @property
-    def of_biases(self) -> np.ndarray:
-        """Regressors [B, N, k] of the biases: D without the scale errors, for these are none."""
-        design = self.design.copy()
-        design[..., self.plain - self.scales : self.plain] = 0.0
-        return design
 
     def part(self, kept: np.ndarray) -> Evidence:
         """Some of the blocks, by their numbers, increasing: the others are as if they had not been measured."""
@@ -172,7 +156,7 @@ class Evidence:
     def _cleared(self, filtered: Filtered) -> Filtered:
         squares = filtered.squares.copy()
         starts = () if self.anchored else (1, 1 + self.plain)
-        for start in (*starts, 1 + self.plain - self.scales) if self.scales else starts:
+        for start in starts:
             rows = slice(start, start + self.gyros)
             if start < len(squares):
                 squares[rows] -= squares[rows].mean(axis=0)
@@ -187,18 +171,17 @@ def _design(
     blocks: int,
     gyros: int,
     steps: list[tuple[int, int, float]],
-    rate: np.ndarray | None,
     temperature: np.ndarray | None,
 ) -> np.ndarray:
-    """Regressors [B, N, k] of the constants: what each gyro follows comes after the biases and steps."""
-    followed = [one for one in (rate, temperature) if one is not None]
-    design = np.zeros((blocks, gyros, gyros + len(steps) + gyros * len(followed)))
+    """Regressors [B, N, k] of the constants: the temperature's come after the biases and steps."""
+    plain = gyros + len(steps)
+    design = np.zeros((blocks, gyros, plain if temperature is None else plain + gyros))
     each = np.arange(gyros)
     design[:, each, each] = 1.0
     for number, (back, gyro, _) in enumerate(steps):
         design[back:, gyro, gyros + number] = 1.0
-    for number, one in enumerate(followed, start=1):
-        design[:, each, number * gyros + len(steps) + each] = one[:, None]
+    if temperature is not None:
+        design[:, each, plain + each] = temperature[:, None]
     return design
 
 

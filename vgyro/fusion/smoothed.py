@@ -26,8 +26,6 @@ from vgyro.fusion.motion_shared import shared_lines
 from vgyro.fusion.parity import Variances, shared_variances
 from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, mean_variance, smooth
 
-SLOW_BESIDE_POLE = 0.5
-"""The sensor's pole is undone where the smoother's bandwidth is below this share of the pole's frequency."""
 MEAN_HALF_POWER = 0.443
 """-3 dB bandwidth of a mean over T, times T: sin(πx)/(πx) = 1/√2."""
 REST_NOTE = "at rest as a whole: a fixed bandwidth, forward and back"
@@ -41,7 +39,7 @@ class Signal:
     colour   : correlation of that noise from one sample to the next
     weights  : as in Fused;  note : what to know of them
     slow_variance : [T] of its slow error, (deg/s)², which no smoothing takes away; None: not known
-    undo_pole : take the low-pass of the sensor, which colours its noise, off the smoothed rate
+    late_s   : how late the rate is, s, by its sensors' low-pass: undone on the smoothed rate; 0: not known
     """
 
     rate: np.ndarray
@@ -50,7 +48,7 @@ class Signal:
     weights: np.ndarray | SampleWeights | None
     note: str
     slow_variance: np.ndarray | None = None
-    undo_pole: bool = False
+    late_s: float = 0.0
 
 
 def average_smoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
@@ -135,14 +133,9 @@ def smoothed(array: ArrayRates, parameters: FilterParameters, signal: Signal) ->
     if slow is not None:
         sd = np.sqrt(variance + slow, dtype=np.float32)
     notes = [result.parameters, REST_NOTE if not parameters.in_motion else "", signal.note]
-    rate, lead_s = result.rate, 0.0
-    if signal.undo_pole and parameters.in_motion and signal.colour > 0:
-        lead_s = pole_time(signal.colour, array.period)
-        if result.bandwidth_hz < SLOW_BESIDE_POLE / (2.0 * math.pi * lead_s):
-            rate = without_pole(array, rate, lead_s)
-            notes.append(f"the sensor's pole at {1.0 / (2.0 * math.pi * lead_s):.3g} Hz is undone")
-        else:
-            lead_s = 0.0
+    rate, lead_s = result.rate, signal.late_s if parameters.in_motion else 0.0
+    if lead_s:
+        rate = without_pole(array, rate, lead_s)
     seconds = max(part.stop - part.start for part in array.stretches()) * array.period
     return Fused(
         rate,
@@ -161,12 +154,6 @@ def smoothed(array: ArrayRates, parameters: FilterParameters, signal: Signal) ->
 def not_below(value: float, least: float) -> float:
     """The greater of both; NaN stays."""
     return value if math.isnan(value) else max(value, least)
-
-
-def pole_time(colour: float, period: float) -> float:
-    """Time constant, s, of the first-order low-pass that makes white noise correlate by `colour` from one sample to
-    the next: -T/ln φ."""
-    return -period / math.log(colour)
 
 
 def without_pole(array: ArrayRates, rate: np.ndarray, time_s: float) -> np.ndarray:
@@ -193,6 +180,8 @@ def shared_activity(array: ArrayRates, parameters: FilterParameters) -> Activity
     """How lively the rate is: from the best fused rate, for every row that is smoothed, as its model is."""
 
     def find() -> Activity | None:
+        if not parameters.has("activity"):
+            return None
         known, motion = analysed(array, parameters), shared_motion(array, parameters)
         rate, variance = known.bridged(known.rate(), known.variance())
         return find_activity(
@@ -233,6 +222,8 @@ def shared_vibration(array: ArrayRates, parameters: FilterParameters) -> AtRest:
     """What moves in a recording at rest: from the best fused rate, for every row that is smoothed."""
 
     def find() -> AtRest:
+        if not parameters.has("lines"):
+            return AtRest((), 0.0)
         known = analysed(array, parameters)
         mean = mean_variance(known.variance())
         fixed = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)

@@ -20,6 +20,7 @@ from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
 from vgyro.fusion.parity_blocks import STUCK_SAMPLES, STUCK_SHARE
 from vgyro.fusion.robust_rate import (
+    FAR,
     LEAST_SIZE,
     REACHES,
     Local,
@@ -33,16 +34,17 @@ from vgyro.fusion.robust_rate import (
 )
 from vgyro.fusion.scale_mixture import ScaleMixture, fitted, histogram, middles
 
-LOOK, WINDOWS = 1 << 17, 16
+LOOK, WINDOWS = 1 << 16, 16
 """Samples that are looked at, at most, and windows that they are spread over."""
 NEAR_STEP, STEPS = 1 << 11, 2
 """Samples about each of the largest steps of a gyro that are looked at as well, and how many of these."""
-WARY_ROUNDS, FIT_ROUNDS, ROUNDS = 4, 4, 6
+WARY_ROUNDS, FIT_ROUNDS, ROUNDS = 4, 3, 6
 LEAST_GAIN = 1.04
 """A gyro whose variance would fall by less than this factor is left as it is."""
 NO_CHANGE = 1e-3
 """Samples that would move by less than this part of their deviation stay as they are, to the bit."""
 FEWEST = 256
+NORMAL = ScaleMixture.normal()
 WARY = ScaleMixture.of(np.exp2(0.5 * np.arange(-2, 40)), np.exp2(-0.75 * np.abs(np.arange(-2, 40))))
 """What is thought of a gyro before anything is known of it: tails about as heavy as those of Student's t of 2 d.o.f."""
 
@@ -117,8 +119,10 @@ def _look(array: ArrayRates, rows: slice) -> Look:
 
 def _stuck(values: np.ndarray) -> np.ndarray:
     """[N, n]: samples in a window in which the gyro has hardly a step, while the others have."""
-    over = np.stack([box(one, STUCK_SAMPLES) for one in np.diff(values, axis=1, prepend=values[:, :1]) ** 2])
-    # What is left of a large step in the running sums is no step.
+    steps = np.diff(values, axis=1, prepend=values[:, :1]) ** 2
+    # One step far off is none of the others' motion.
+    usual = np.median(steps, axis=1, keepdims=True)
+    over = np.stack([box(one, STUCK_SAMPLES) for one in np.where(usual > 0, np.minimum(steps, FAR * usual), steps)])
     small = over <= STUCK_SHARE * np.median(over, axis=0)
     if not small.any():
         return small
@@ -132,21 +136,21 @@ def _found(looks: Sequence[Look], rate_hz: float, steps: np.ndarray) -> tuple[Se
     asked &= np.sum([one.used.sum(axis=1) for one in looks], axis=0) >= FEWEST
     if not asked.any():
         return None
-    setting = replace(setting, densities=[WARY if one else ScaleMixture.normal() for one in asked])
+    setting = replace(setting, densities=[WARY if one else NORMAL for one in asked])
     known = [start(one, setting) for one in looks]
+    gains = np.zeros(len(asked))
     for number in range(WARY_ROUNDS + FIT_ROUNDS):
         known = [improved(one, setting, local) for one, local in zip(looks, known, strict=True)]
-        if number == WARY_ROUNDS // 2:
+        if number == 1:
             setting = replace(setting, reach=_reach(looks, known, setting))
-        if number >= WARY_ROUNDS:
-            densities = [
-                fitted(_counts(looks, known, gyro)) if one else ScaleMixture.normal() for gyro, one in enumerate(asked)
-            ]
-            setting = replace(setting, densities=densities)
-    gains = np.array([_gain(looks, known, setting, gyro) if one else 0.0 for gyro, one in enumerate(asked)])
-    if not gains.any():
-        return None
-    densities = [one if gain else ScaleMixture.normal() for one, gain in zip(setting.densities, gains, strict=True)]
+        if number < WARY_ROUNDS:
+            continue
+        densities = [fitted(_counts(looks, known, gyro)) if one else NORMAL for gyro, one in enumerate(asked)]
+        setting = replace(setting, densities=densities)
+        gains = np.array([_gain(looks, known, setting, gyro) if one else 0.0 for gyro, one in enumerate(asked)])
+        if not gains.any():
+            return None
+    densities = [one if gain else NORMAL for one, gain in zip(setting.densities, gains, strict=True)]
     return replace(setting, densities=densities), gains
 
 

@@ -20,8 +20,8 @@ MOST_ROWS = 100
 FAULT_RULE = (
     "A gyro fails where it leaves the combination of the other gyros of its array by more than healthy gyros of this "
     "recording do, by as many standard deviations as analysis.faults.threshold says; the strongest event is taken "
-    "first, and that gyro left out there, so that it accuses no other. What is wrong all the time is no event: see the "
-    f"rule for bad gyros. Red: to the end of the recording, or more than {LONG_SHARE:.0%} of it."
+    "first, and that gyro left out there, so that it accuses no other. Noise or scale that is wrong all the time is no "
+    f"event: see the rule for bad gyros. Red: to the end of the recording, or more than {LONG_SHARE:.0%} of it."
 )
 
 
@@ -137,7 +137,7 @@ def _row(row: dict[str, Any]) -> Row:
         Cell(row["kind"]),
         Cell(plain(float(row["start"]), 7)),
         Cell(plain(float(row["stop"]), 7)),
-        Cell(significant(evidence) if np.isfinite(evidence) else "certain", hint="one value, exactly repeated"
+        Cell(significant(evidence) if np.isfinite(evidence) else "certain", hint="the values alone show it"
              if not np.isfinite(evidence) else ""),
         Cell(_size(row["kind"], size, str(row["unit"]))),
         Cell(row["sentence"]),
@@ -147,6 +147,6 @@ def _row(row: dict[str, Any]) -> Row:
 def _size(kind: str, size: float, unit: str) -> str:
     if not np.isfinite(size):
         return "—"
-    if kind == "scale":
+    if kind in ("scale", "dead"):
         return f"{100.0 * size:+.3g} %"
     return f"{size:.3g} ×" if unit == "1" else f"{size:+.3g} {unit}"

@@ -127,14 +127,15 @@ _ALL = (
         Column("sd_{gyro}", "deg/s", "conditional standard deviation of the gyro, √h"),
         Column("status", "", "ok, or what was left out, or why the weights are equal"),
     )),
-    Schema("faults", 1, "stretches in which one gyro is at fault", (
+    Schema("faults", 2, "stretches in which one gyro is at fault", (
         Column("gyro", "", "gyro"),
-        Column("kind", "", "drift, step, noise, burst, stuck, dropout or scale"),
+        Column("kind", "", "drift, step, noise, burst, stuck, dropout, scale, dead, copy, outlier or clipped"),
         Column("start", "s", "time of its first sample"),
         Column("stop", "s", "time of its last sample"),
-        Column("evidence", "1", "size over its standard error; infinite for stuck and dropout"),
-        Column("size", "see unit", "greatest drift, step, ratio of the noise, change of the scale; NaN where none"),
+        Column("evidence", "1", "size over its standard error; infinite where the values alone show it"),
+        Column("size", "see unit", "drift, step, outlier, ratio of noise, change of scale, end of range; NaN: none"),
         Column("unit", "", "unit of size"),
+        Column("other", "", "gyro that a copy repeats; empty: of another kind"),
         Column("sentence", "", "the event in one sentence"),
     )),
     Schema("bekk", 1, "BEKK, DCC and CCC on a sample of windows", (

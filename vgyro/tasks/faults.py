@@ -56,7 +56,7 @@ def main(task: Task) -> None:
         times = times_at(file.path, [sample for one in events for sample in (one.start, one.stop - 1)])
         ends = [one.stop == len(array.rate) for one in events]
         pairs = zip(events, times.reshape(-1, 2).tolist(), ends, strict=True)
-        rows = [row_of(names[one.gyro], one, *time, to_the_end=end) for one, time, end in pairs]
+        rows = [row_of(names, one, *time, to_the_end=end) for one, time, end in pairs]
     for row in rows:
         logging.info("%s", row["sentence"])
     extra = {"note": note, "gyros": names, "looked_for": ALL_KINDS, "threshold": options.threshold}
@@ -106,17 +106,19 @@ def _extremes(path: Path, column: str) -> tuple[float, float]:
     return min(part.min for part in known), max(part.max for part in known)
 
 
-def row_of(gyro: str, event: FaultEvent, start: float, stop: float, *, to_the_end: bool) -> dict[str, Any]:
-    """A row of faults.parquet."""
+def row_of(gyros: Sequence[str], event: FaultEvent, start: float, stop: float, *, to_the_end: bool) -> dict[str, Any]:
+    """A row of faults.parquet.  gyros : names of those of the array"""
+    gyro, other = gyros[event.gyro], "" if event.other is None else gyros[event.other]
     return {
         "gyro": gyro, "kind": event.kind, "start": start, "stop": stop, "evidence": float(event.evidence),
-        "size": float(event.size), "unit": event.unit, "sentence": sentence(gyro, event, start, stop, to_the_end),
+        "size": float(event.size), "unit": event.unit, "other": other,
+        "sentence": sentence(gyro, event, start, stop, to_the_end, other),
     }  # fmt: skip
 
 
 def table_of(rows: list[dict[str, Any]]) -> pa.Table:
     """Rows → table; without rows, too, the columns have their types."""
-    columns = ("gyro", "kind", "start", "stop", "evidence", "size", "unit", "sentence")
+    columns = ("gyro", "kind", "start", "stop", "evidence", "size", "unit", "other", "sentence")
     return pa.Table.from_pylist(
         rows, schema=pa.schema([(name, pa.float64() if name in FIGURES else pa.string()) for name in columns])
     )

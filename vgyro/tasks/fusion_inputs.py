@@ -71,7 +71,8 @@ def open_array(task: Task) -> OpenArray:
     fusion = FusionOptions.model_validate(analysis.get("fusion", {}))
     volatility = VolatilityOptions.model_validate(analysis.get("volatility", {}))
     board = Board.model_validate(task.options["board"])
-    gyros = [gyro.name for gyro in board.array(task.options["axis"])]
+    members = board.array(task.options["axis"])
+    gyros = [gyro.name for gyro in members]
     file = read_array(task.input("rates"), gyros, task.options["axis"])
     tables = [*task.inputs.get("weights", []), *task.inputs.get("moved", [])]
     block_hz = file.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
@@ -83,6 +84,7 @@ def open_array(task: Task) -> OpenArray:
         deviations=deviations,
         temperature=read_temperature(file, thermometers(board, gyros)) if fusion.temperature == "auto" else None,
         stretch_time=stretch_times(file), missing=file.missing,
+        lowpass_hz=np.array([gyro.lowpass_hz or np.nan for gyro in members]),
     )  # fmt: skip
     moving = in_motion(task.options["kind"], file.at_rest, file.moved)
     parameters = FilterParameters.of(fusion, moving, block_hz, analysis.get("engine", "native"))

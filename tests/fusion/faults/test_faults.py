@@ -271,7 +271,7 @@ def test_a_board_that_is_turned_over_between_rests():
         still = replace(array_of(rate), at_rest=at_rest)
         search = search_faults(still, in_hand=True)
         assert search.events == []
-        assert "in motion only stuck and dropout" in search.note
+        assert "in motion only gyros that give no rate" in search.note
         noisy, stuck = (array.time >= 205) & (array.time < 235), (array.time >= 380.5) & (array.time < 383)
         white = array.sigma[1] * np.sqrt(RATE_HZ) * np.random.default_rng(seed).standard_normal(noisy.sum())
         rate[noisy, 1] += np.sqrt(8) * white

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from vgyro.fusion.events import FaultKind
-from vgyro.fusion.faults.candidate import Candidate, lengths_up_to
+from vgyro.fusion.faults.candidate import Candidate, lengths_up_to, running_sum
 from vgyro.fusion.faults.change import Change, fit_change, hinge, lasting_change, run_of
 from vgyro.fusion.faults.wander import Slow, contrasts
 
@@ -33,7 +33,7 @@ def suspect_bias(slow: Slow, gyro: int, block_s: float, threshold: float) -> lis
     least = LEAST_SIZE * float(np.sqrt(slow.usual_white))
     longest_step = max(1, round(LONGEST_STEP_S / block_s))
     evidence, place, length = _contrast(slow, 0.5 * least)
-    changes = [lasting_change(slow, *rows) for rows in _long_runs(slow.run)]
+    changes = [lasting_change(slow, *rows) for rows in _long_runs(slow)]
     lasting = max(changes, key=lambda one: one.evidence, default=None)
     faults: list[Candidate] = []
     if evidence >= threshold:
@@ -67,9 +67,10 @@ def _contrast(slow: Slow, least: float) -> tuple[float, int, int]:
     return best
 
 
-def _long_runs(run: np.ndarray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(run, prepend=run[0] - 1, append=run[-1] + 1))
-    return [(int(low), int(high)) for low, high in pairwise(edges) if high - low >= FEWEST_BLOCKS]
+def _long_runs(slow: Slow) -> list[tuple[int, int]]:
+    run, counted = slow.run, running_sum(slow.counts)
+    edges = np.flatnonzero(np.diff(run, prepend=run[0] - 1, append=run[-1] + 1)).tolist()
+    return [(low, high) for low, high in pairwise(edges) if counted[high] - counted[low] >= FEWEST_BLOCKS]
 
 
 def _windows(blocks: int) -> list[tuple[int, int]]:

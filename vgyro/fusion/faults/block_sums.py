@@ -7,10 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.fusion.array import ArrayRates
+from vgyro.fusion.faults.candidate import NORMAL_MEDIAN
 
 FEWEST_SAMPLES = 8  # in a block, so that it has a variance
 PIECE = 1 << 15
 SILENT = 1e-10
+FARTHEST = 4.0
+"""A sample counts as no farther from the middle of its block than so many deviations, by the median of the distances:
+tails of the noise are no burst, while a burst has a median of its own."""
+CALMEST = 0.25
+"""Quantile of the deviations of the blocks: that of a block is at least so great, for few samples tell it roughly."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,7 @@ class BlockSums:
     mean   : [B, N + 1] deg/s, of each gyro less the average of all, and of that average
     moment : [B, N + 1, N + 1] (deg/s)², second moments about these means, 1/count
     run    : [B] number of the stretch, those with a short gap between them taken as one
+    alive  : [B, N] the gyro has a rate in every sample of the block
     """
 
     edges: np.ndarray
@@ -29,6 +36,7 @@ class BlockSums:
     mean: np.ndarray
     moment: np.ndarray
     run: np.ndarray
+    alive: np.ndarray
 
     @property
     def gyros(self) -> int:
@@ -37,12 +45,17 @@ class BlockSums:
     def __len__(self) -> int:
         return len(self.count)
 
+    def variance(self, gyro: int) -> np.ndarray:
+        """Variance of a gyro in each block [B], (deg/s)²."""
+        return self.moment[:, gyro, gyro] + 2.0 * self.moment[:, gyro, -1] + self.moment[:, -1, -1]
+
 
 def silent_share(sums: BlockSums) -> np.ndarray:
-    """Share of the blocks in which each gyro gives one value alone [N]."""
+    """Share of the blocks in which each gyro gives one value alone [N], of those in which it has rates."""
     together = sums.moment[:, -1, -1, None] + 2.0 * sums.moment[:, :-1, -1]
     own = together + np.diagonal(sums.moment, axis1=1, axis2=2)[:, :-1]
-    return np.mean(own <= SILENT * np.max(own, axis=0), axis=0)
+    silent = (own <= SILENT * np.max(own, axis=0)) & sums.alive
+    return silent.sum(axis=0) / np.maximum(sums.alive.sum(axis=0), 1)
 
 
 def block_length(rate_hz: float, block_s: float) -> int:
@@ -50,11 +63,14 @@ def block_length(rate_hz: float, block_s: float) -> int:
     return max(FEWEST_SAMPLES, round(rate_hz * block_s))
 
 
-def block_sums(array: ArrayRates, length: int, dead: list[np.ndarray], longest_gap_s: float) -> BlockSums:
+def block_sums(
+    array: ArrayRates, length: int, longest_gap_s: float, gone: np.ndarray | None = None, odd: np.ndarray | None = None
+) -> BlockSums:
     """Sums over blocks of about `length` samples, in one pass over the rates.
 
-    dead : of each gyro, stretches [M, 2] of samples without a rate; the average of the others is taken for them
     longest_gap_s : a longer time without samples ends a run
+    gone, odd : [T, N] samples of a gyro that are no rates, and single ones that are absurd; None: there are none. A
+                block with one that is gone has no rate of that gyro; what is odd is replaced by what the others say
     """
     first, run = _blocks(array, length, longest_gap_s)
     edges = np.append(first, len(array.rate))
@@ -62,13 +78,17 @@ def block_sums(array: ArrayRates, length: int, dead: list[np.ndarray], longest_g
     gyros = array.rate.shape[1]
     mean = np.empty((len(count), gyros + 1))
     moment = np.empty((len(count), gyros + 1, gyros + 1), dtype=np.float32 if gyros > 16 else np.float64)
+    alive = np.ones((len(count), gyros), dtype=bool)
     block, per_piece = 0, max(1, PIECE // length)
     while block < len(count):
         last = min(block + per_piece, len(count))
         rows = slice(int(edges[block]), int(edges[last]))
-        columns = _columns(array.rate, rows, dead)
         begins = edges[block:last] - rows.start
         sizes = count[block:last]
+        lost = None if gone is None or not gone[rows].any() else gone[rows].T
+        if lost is not None:
+            alive[block:last] = ~np.logical_or.reduceat(lost, begins, axis=1).T
+        columns = _columns(array.rate[rows].T, lost, None if odd is None else odd[rows].T, begins)
         mean[block:last] = (np.add.reduceat(columns, begins, axis=1) / sizes).T
         columns -= np.repeat(mean[block:last].T, sizes, axis=1)
         for one in range(gyros + 1):
@@ -76,7 +96,7 @@ def block_sums(array: ArrayRates, length: int, dead: list[np.ndarray], longest_g
                 product = np.add.reduceat(columns[one] * columns[other], begins) / sizes
                 moment[block:last, one, other] = moment[block:last, other, one] = product
         block = last
-    return BlockSums(edges, count, mean, moment, run)
+    return BlockSums(edges, count, mean, moment, run, alive)
 
 
 def _blocks(array: ArrayRates, length: int, longest_gap_s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -96,23 +116,55 @@ def _blocks(array: ArrayRates, length: int, longest_gap_s: float) -> tuple[np.nd
     return np.concatenate(first), np.concatenate(run)
 
 
-def _columns(rate: np.ndarray, rows: slice, dead: list[np.ndarray]) -> np.ndarray:
-    """[N + 1, n] of the samples: each gyro less the average, and the average, dead gyros left out of it."""
-    gyros = rate.shape[1]
-    columns = np.empty((gyros + 1, rows.stop - rows.start))
-    gone = np.zeros((gyros, rows.stop - rows.start), dtype=bool)
-    for gyro in range(gyros):
-        columns[gyro] = rate[rows, gyro]
-        for start, stop in dead[gyro]:
-            if start < rows.stop and stop > rows.start:
-                gone[gyro, max(start - rows.start, 0) : stop - rows.start] = True
-    if gone.any():
-        columns[:gyros][gone] = 0.0
-        alive = gyros - gone.sum(axis=0)
-        columns[gyros] = columns[:gyros].sum(axis=0) / np.maximum(alive, 1)
-        columns[:gyros] -= columns[gyros]
-        columns[:gyros][gone] = 0.0
+def _columns(values: np.ndarray, lost: np.ndarray | None, odd: np.ndarray | None, begins: np.ndarray) -> np.ndarray:
+    """[N + 1, n] of the samples: each gyro less the average, and the average, tails cut off and holes filled in.
+
+    values [N, n];  lost, odd [N, n] : samples that are none
+    """
+    gyros = len(values)
+    columns = np.empty((gyros + 1, values.shape[1]))
+    columns[:gyros] = values
+    hole = lost if odd is None else odd if lost is None else lost | odd
+    if hole is not None and hole.any():
+        columns[:gyros][hole] = np.nan
+        columns[:gyros, hole.all(axis=0)] = 0.0
+        middle = np.nanmedian(columns[:gyros], axis=0)
     else:
-        columns[gyros] = columns[:gyros].mean(axis=0)
-        columns[:gyros] -= columns[gyros]
+        middle = np.median(columns[:gyros], axis=0)
+    columns[:gyros] -= middle
+    _cut(columns[:gyros], begins)
+    average = columns[:gyros].mean(axis=0)
+    columns[:gyros] -= average
+    columns[gyros] = middle + average
     return columns
+
+
+def _cut(away: np.ndarray, begins: np.ndarray) -> None:
+    """Cut off what is far from the median of its gyro and block; what is not known becomes that median. In place.
+
+    away [N, n] : distances from the middle gyro, NaN: not known;  begins [B] : first places of the blocks
+    """
+    sizes = np.diff(begins, append=away.shape[1])
+    width = int(sizes.max())
+    places = np.minimum(begins[:, None] + np.arange(width), away.shape[1] - 1)
+    outside = np.arange(width) >= sizes[:, None]
+    for one in away:
+        known = np.isfinite(one)
+        size = np.add.reduceat(known, begins, dtype=int)
+        level = _block_medians(np.where(known, one, np.inf)[places], outside, size)
+        one -= np.repeat(level, sizes)
+        deviation = _block_medians(np.where(known, np.abs(one), np.inf)[places], outside, size) / NORMAL_MEDIAN
+        calm = float(np.quantile(deviation[size > 0], CALMEST)) if (size > 0).any() else 0.0
+        most = FARTHEST * np.maximum(deviation, calm)
+        most[most <= 0] = np.inf
+        most = np.repeat(most, sizes)
+        np.clip(one, -most, most, out=one)
+        one[~known] = 0.0
+        one += np.repeat(level, sizes)
+
+
+def _block_medians(values: np.ndarray, outside: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Lower medians [B] of the `size` least of values [B, n] that are not outside; 0 where there is none."""
+    order = np.sort(np.where(outside, np.inf, values), axis=1)
+    middle = order[np.arange(len(order)), np.maximum(size - 1, 0) // 2]
+    return np.where(size > 0, middle, 0.0)

@@ -40,6 +40,13 @@ def spread(values: np.ndarray) -> float:
     return float(np.median(np.abs(values))) / NORMAL_MEDIAN if values.size else 0.0
 
 
+def weighted_median(values: np.ndarray, weight: np.ndarray) -> float:
+    """The value below which half of the weight lies."""
+    order = np.argsort(values)
+    heap = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(heap, 0.5 * heap[-1])])
+
+
 def best_interval(sums: np.ndarray, first: int, last: int, rounds: int = 4) -> tuple[int, int]:
     """Maximum-likelihood ends of a stretch of another mean, near [first, last).
 

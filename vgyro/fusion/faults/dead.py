@@ -9,6 +9,7 @@ import numpy as np
 
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.events import FaultEvent, FaultKind
+from vgyro.fusion.quantised import steps
 
 SHORTEST_S = 1.0
 RAREST = 1e-9
@@ -18,6 +19,11 @@ USUAL_SHARE = 0.75
 SAME = 1e-3
 """Two samples are one value if they differ by less than this share of the usual difference: a compensation of the
 temperature turns a repeated count into rates that creep."""
+LEAST_USUAL = 0.05
+"""The usual difference of a gyro is that of the middle one times this, at least."""
+ALIVE_CHANGES = 0.2
+"""Where the others change from fewer of their samples to the next, their counts are coarser than their noise."""
+MOVED_STEPS = 2.0
 SLOW, FEWEST_RUNS = 0.5, 10
 """Runs of missing samples a value there, and at all, from which a gyro counts as one at a lower rate."""
 PIECE = 1 << 18
@@ -31,19 +37,42 @@ def find_dead(array: ArrayRates, zero: np.ndarray | None = None) -> list[FaultEv
     Values that are missing, and were filled in (array.missing), are a dropout where they are for a second or more.
     zero : [N, 2] deg/s, between which the rate of a count of zero lies, NaN where not known
     A run is judged against this channel's own: the chance of equal neighbours, and its usual run, since few levels make
-    equal counts normal. It is a dropout where its value is that of zero counts, or far from what the gyro gave before.
+    equal counts normal, and against what the others do meanwhile. It is a dropout where its value is that of zero
+    counts, or far from what the gyro gave before.
     """
     found = []
-    for gyro in range(array.rate.shape[1]):
+    gyros = array.rate.shape[1]
+    usual = np.array([_usual_difference(array.rate[:, gyro]) for gyro in range(gyros)])
+    # A repeated count creeps where the temperature is compensated: its own differences are none.
+    usual = np.maximum(usual, LEAST_USUAL * np.median(usual))
+    for gyro in range(gyros):
         column = array.rate[:, gyro]
-        runs = _runs(column, array.segment, _usual_difference(column))
+        runs = _runs(column, array.segment, float(usual[gyro]))
         level = (math.nan, math.nan) if zero is None else (float(zero[gyro, 0]), float(zero[gyro, 1]))
-        found += [_event(array, gyro, start, stop, level) for start, stop in _too_long(runs, array)]
+        long = (run for run in _too_long(runs, array) if not may_be_rounded(array, gyro, *run))
+        found += [_event(array, gyro, start, stop, level) for start, stop in long]
         if array.missing is None:
             found += [_empty(gyro, start, stop) for start, stop in _missing(column)]
         else:
             found += [_empty(gyro, start, stop) for start, stop in _long_gone(array.missing[:, gyro], array.rate_hz)]
     return sorted(found, key=lambda event: (event.start, event.gyro))
+
+
+def may_be_rounded(array: ArrayRates, gyro: int, start: int, stop: int) -> bool:
+    """May a healthy gyro repeat one value in samples [start, stop)? It may where counts are coarser than the noise.
+
+    Such gyros do not change between two counts, and one that lies near a border does; but what the board moves by some
+    counts, it must follow.
+    """
+    others = np.delete(np.arange(array.rate.shape[1]), gyro)
+    if not len(others):
+        return False
+    part = array.rate[start:stop][:, others]
+    if float(np.median(np.mean(part[1:] != part[:-1], axis=0))) >= ALIVE_CHANGES:
+        return False
+    together = np.median(part, axis=1)
+    step = float(steps(array)[gyro])
+    return float(np.ptp(together)) <= MOVED_STEPS * step
 
 
 def _usual_difference(column: np.ndarray) -> float:

@@ -22,6 +22,7 @@ MOST_AT_ONCE = 64
 APART = 64
 """Blocks between two windows whose noise no longer depends on each other's (GARCH noise of α + β = 0.95: 4 %)."""
 FEWEST_WINDOWS = 16
+LEAST_BREAK = 4  # blocks
 LEAST_SHARE = 0.05
 
 
@@ -143,7 +144,7 @@ def _farthest(state: NoiseLevel, block_s: float, threshold: float) -> tuple[floa
         return None
     evidence, first, last = best
     # What is below the usual counts as usual: only an increase is looked for.
-    first, last = best_interval(sums, first, last)
+    first, last = _unbroken(sums, *best_interval(sums, first, last), threshold * state.spread[1])
     number = max(usable[last] - usable[first], 1.0)
     mean = float(sums[last] - sums[first]) / number
     length = 1 << int(np.log2(number))
@@ -151,6 +152,28 @@ def _farthest(state: NoiseLevel, block_s: float, threshold: float) -> tuple[floa
     while last < len(state.counts) and not state.counts[last]:
         last += 1
     return evidence, first, last, mean
+
+
+def _unbroken(sums: np.ndarray, first: int, last: int, price: float) -> tuple[int, int]:
+    """The stretch, or the stronger of two parts of it that are apart by a stretch of usual noise.
+
+    sums : as of best_interval;  price : two parts must gain the square of it: twice the log-likelihood ratio is Σx²/n
+    """
+    while last - first > 2 * LEAST_BREAK:
+        mean = (sums[last] - sums[first]) / (last - first)
+        # The break is where the sum of mean/2 - x grows most.
+        lack = 0.5 * mean * np.arange(last - first + 1) - (sums[first : last + 1] - sums[first])
+        low = np.minimum.accumulate(lack)
+        stop = int(np.argmax(lack - low))
+        start = int(np.argmin(lack[: stop + 1]))
+        if start == 0 or stop == last - first or stop - start < LEAST_BREAK:
+            break
+        parts = ((first, first + start), (first + stop, last))
+        gains = [(sums[high] - sums[low]) ** 2 / (high - low) for low, high in parts]
+        if sum(gains) - mean**2 * (last - first) < price**2:
+            break
+        first, last = parts[int(np.argmax(gains))]
+    return first, last
 
 
 def mean_level(state: NoiseLevel, first: int, last: int) -> float:

@@ -16,7 +16,7 @@ LEVEL_BLOCKS = 32
 LEAST_SHARE = 0.02
 ROUNDS = 3
 IN_MOTION = 25.0
-"""A block moves where the motion's variance in it is so many times that of the noise of the combination."""
+"""A block moves where what its gyros share has so many times the variance of the noise of the combination."""
 
 
 @dataclass(frozen=True)
@@ -52,19 +52,33 @@ class Residuals:
     moving: np.ndarray
 
 
-def usual_variance(sums: BlockSums) -> np.ndarray:
+def usual_variance(sums: BlockSums, gain: np.ndarray | None = None) -> np.ndarray:
     """Variance of a sample of each gyro [N], from the residuals against the combination of the others.
 
+    gain : [N] sensitivities, by which the rates are divided
     The median over the blocks of c'Gc, c = (1, -u_j, …), is σ_i² + Σ_{j≠i} u_j²·σ_j², which is solved for σ²; first
-    with equal shares u, then with those of inverse variance, in which a noisy gyro hardly counts.
+    with equal shares u, then with those of inverse variance, in which a noisy gyro hardly counts. Only blocks count in
+    which the gyro has rates; of shares that differ from block to block, as gyros come and go, u² is a mean.
     """
     gyros = sums.gyros
+    gain = np.ones(gyros) if gain is None else gain
     sigma2 = np.ones(gyros)
     for _ in range(ROUNDS):
-        share = np.where(np.eye(gyros, dtype=bool), 0.0, 1.0 / sigma2)
-        mix = np.eye(gyros) - share / share.sum(axis=1, keepdims=True)
-        seen = np.median(np.einsum("ip,bpq,iq->bi", mix, sums.moment[:, :gyros, :gyros], mix, optimize=True), axis=0)
-        sigma2 = np.maximum(np.linalg.solve(mix**2, seen), LEAST_SHARE * np.median(seen))
+        seen, squares = np.full(gyros, np.nan), np.eye(gyros)
+        for gyro in range(gyros):
+            share = np.where(sums.alive, 1.0 / sigma2, 0.0)
+            share[:, gyro] = 0.0
+            total = share.sum(axis=1)
+            known = sums.alive[:, gyro] & (total > 0)
+            if not known.any():
+                continue
+            share = share[known] / total[known, None]
+            squares[gyro] += (share**2).mean(axis=0)
+            share[:, gyro] = -1.0
+            parts = np.column_stack([share / gain, (share / gain).sum(axis=1)])
+            seen[gyro] = np.median(np.einsum("bp,bpq,bq->b", parts, sums.moment[known], parts, optimize=True))
+        middle = np.nanmedian(seen)
+        sigma2 = np.maximum(np.linalg.solve(squares, np.where(np.isnan(seen), middle, seen)), LEAST_SHARE * middle)
     return sigma2
 
 
@@ -72,16 +86,50 @@ def common_ratio(sums: BlockSums, sigma2: np.ndarray, gain: np.ndarray) -> np.nd
     """How far most gyros leave the others at once [B]: variance of a difference in a block over the usual one.
 
     gain : [N] sensitivities
-    Of each gyro its median over the partners, the lower one, then the median of the gyros: a few bad ones do not count.
+    Of each gyro its median over the partners, the lower one, then the median of the gyros: a few bad ones do not count,
+    and those without a rate in the block do not at all.
     """
     gyros = sums.gyros
     parts = np.column_stack([np.diag(1.0 / gain), 1.0 / gain])
     moment = np.einsum("ip,bpq,jq->bij", parts, sums.moment, parts, optimize=True)
     own = np.diagonal(moment, axis1=1, axis2=2)
     ratio = (own[:, :, None] + own[:, None, :] - 2.0 * moment) / (sigma2[:, None] + sigma2)
+    ratio[~(sums.alive[:, :, None] & sums.alive[:, None, :])] = np.inf
     # Itself, with no difference at all, comes first in the order.
-    of_each = np.sort(ratio, axis=2)[:, :, 1 + (gyros - 2) // 2]
-    return np.median(of_each, axis=1)
+    partners = np.maximum(sums.alive.sum(axis=1) - 2, 0) // 2 + 1
+    place = np.minimum(np.broadcast_to(partners[:, None, None], (len(sums), gyros, 1)), gyros - 1)
+    of_each = np.take_along_axis(np.sort(ratio, axis=2), place, axis=2)[:, :, 0]
+    of_each = np.where(sums.alive & np.isfinite(of_each), of_each, np.nan)
+    return np.where(sums.alive.sum(axis=1) > 1, _row_medians(of_each), 0.0)
+
+
+def shared_energy(sums: BlockSums, gain: np.ndarray) -> np.ndarray:
+    """Variance in a block of what the gyros share [B], (deg/s)²: the median of the covariances of all pairs.
+
+    gain : [B, N]
+    A gyro that is noisy shares nothing with the others, and neither do a few that share their noise with all.
+    """
+    gyros = sums.gyros
+    one, other = np.triu_indices(gyros, 1)
+    common = sums.moment[:, :gyros, gyros]
+    both = sums.moment[:, one, other] + common[:, one] + common[:, other] + sums.moment[:, gyros, gyros, None]
+    both = both / (gain[:, one] * gain[:, other])
+    return _row_medians(np.where(sums.alive[:, one] & sums.alive[:, other], both, np.nan))
+
+
+def _row_medians(values: np.ndarray) -> np.ndarray:
+    """Medians of what is known in each row; 0 where nothing is."""
+    empty = np.isnan(values).all(axis=1)
+    return np.where(empty, 0.0, np.nanmedian(np.where(empty[:, None], 0.0, values), axis=1))
+
+
+def spans_of(away: np.ndarray) -> list[Spoilt]:
+    """Stretches of blocks in which a gyro is away [B, N]."""
+    found = []
+    for gyro in np.flatnonzero(away.any(axis=0)).tolist():
+        edges = np.flatnonzero(np.diff(away[:, gyro], prepend=False, append=False)).reshape(-1, 2)
+        found += [Spoilt(gyro, int(first), int(last)) for first, last in edges]
+    return found
 
 
 def residuals_of(
@@ -124,7 +172,7 @@ def residuals_of(
         energy[:, gyro] = np.einsum("bp,bpq,bq->b", of_others, sums.moment, of_others, optimize=True)
         variance[left == 0, gyro] = np.nan
     others = np.array([1.0 / (everyone.sum() - one) for one in everyone])
-    moving = np.median(energy, axis=1) > IN_MOTION * np.median(others)
+    moving = shared_energy(sums, gain) > IN_MOTION * np.median(others)
     return Residuals(mean, variance, expected, motion, energy, product, others, sigma2, moving)
 
 

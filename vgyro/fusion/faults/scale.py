@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from vgyro.fusion.faults.block_sums import BlockSums
-from vgyro.fusion.faults.candidate import Candidate, lengths_up_to, running_sum, spread
-from vgyro.fusion.faults.residuals import Residuals
+from vgyro.fusion.faults.candidate import Candidate, lengths_up_to, running_sum, spread, weighted_median
+from vgyro.fusion.faults.residuals import Residuals, Spoilt, residuals_of
 
 LEAST_CHANGE = 0.005
 """Smaller changes of the sensitivity are what calibration and mounting leave over, as axes are not quite parallel."""
 FEWEST_BLOCKS = 8
 FEWEST_WINDOWS = 16
 ROUNDS = 4
-EDGE = 2  # blocks
+GAIN_ROUNDS, SETTLED = 6, 1e-5
+LEAST_GAIN = 0.01
+EDGE, AROUND = 2, 4  # blocks
 EARLY = 0.05
 """A change in so early a part of the motion ends a fault rather than begins one."""
 
@@ -43,10 +47,31 @@ def usual_slope(sums: BlockSums, found: Residuals, gyro: int, counts: np.ndarray
     moving = (bottom > 0) & counts
     if moving.sum() < FEWEST_BLOCKS:
         return 0.0
-    slope, weight = top[moving] / bottom[moving], bottom[moving]
-    order = np.argsort(slope)
-    heap = np.cumsum(weight[order])
-    return float(slope[order][np.searchsorted(heap, 0.5 * heap[-1])])
+    return weighted_median(top[moving] / bottom[moving], bottom[moving])
+
+
+def relative_gain(
+    sums: BlockSums, sigma2: np.ndarray, spoilt: Sequence[Spoilt], run: np.ndarray, counts: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Sensitivities of the gyros [N] that are usual in this recording, over that of the middle one.
+
+    counts : of each gyro [B], false where something is known to be wrong;  the rest as of residuals_of
+    The slope against the others says how a gyro answers over how they do: log γ_i - Σ u_ij·log γ_j = log(1 + slope_i),
+    solved for γ, and again with the rates divided by it.
+    """
+    gyros = sums.gyros
+    share = np.where(np.eye(gyros, dtype=bool), 0.0, 1.0 / sigma2)
+    solve = np.linalg.pinv(np.eye(gyros) - share / share.sum(axis=1, keepdims=True))
+    gain = np.ones(gyros)
+    for _ in range(GAIN_ROUNDS):
+        found = residuals_of(sums, sigma2, np.tile(gain, (len(sums), 1)), spoilt, run)
+        slope = np.array([usual_slope(sums, found, gyro, counts[gyro]) for gyro in range(gyros)])
+        change = solve @ np.log(np.maximum(1.0 + slope, LEAST_GAIN))
+        gain = gain * np.exp(change)
+        gain = np.maximum(gain / np.median(gain), LEAST_GAIN)
+        if np.ptp(change[gain > LEAST_GAIN]) < SETTLED:
+            break
+    return gain
 
 
 def slope_in(sums: BlockSums, found: Residuals, gyro: int, first: int, last: int) -> float:
@@ -90,8 +115,13 @@ def suspect_scale(
     if first <= EDGE and EARLY * len(moving) < last < len(moving) - EDGE:
         # The usual slope is that of the longer part; the earlier part is the one without the fault.
         first, last, size = last, len(moving), -size / (1.0 + size)
-    end = len(sums) if last >= len(moving) - EDGE else int(moving[last - 1]) + 1
-    return Candidate(gyro, "scale", int(moving[first]), end, best[0], size, "1")
+    begin, end = int(moving[first]), int(moving[last - 1]) + 1
+    # Where nothing moves, or the rate is at a peak, it may have begun before, and have ended later.
+    before = 0 if first == 0 else int(moving[first - 1]) + 1
+    after = int(np.flatnonzero(counts)[-1]) + 1 if last >= len(moving) - EDGE else int(moving[last])
+    begin = max(before, begin - AROUND)
+    end = after if last >= len(moving) - EDGE else min(after, end + AROUND)
+    return Candidate(gyro, "scale", begin, end, best[0], size, "1")
 
 
 def _ends(sx: np.ndarray, sw: np.ndarray, first: int, last: int) -> tuple[int, int]:

@@ -16,6 +16,7 @@ LEAST_VARIANCE = 1e-3
 ENOUGH_BLOCKS = 50
 ENOUGH_SHARE = 0.2
 NEARBY = 4  # blocks on each side
+EDGE = 8  # blocks on each side of a hole
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,28 @@ def local_variance(found: Residuals, gyro: int) -> np.ndarray:
 
 
 def slow_part(found: Residuals, gyro: int, counts: np.ndarray, run: np.ndarray, mean: np.ndarray) -> Slow:
-    """The residual means [B] of a gyro as a series without holes: a straight line bridges blocks that do not count."""
+    """The residual means [B] of a gyro as a series without holes: a straight line bridges blocks that do not count.
+
+    What does not count at an end of a run is a run of its own, of which nothing is known.
+    """
     mean = mean.copy()
-    if counts.any() and not counts.all():
-        places = np.arange(len(mean))
-        mean[~counts] = np.interp(places[~counts], places[counts], mean[counts])
-    return Slow(mean, _white(mean, found, gyro, counts), counts, run)
+    begins = np.flatnonzero(np.diff(run, prepend=run[0] - 1))
+    borders = {int(one) for one in (*begins, len(run))}
+    holes = np.flatnonzero(np.diff(counts, prepend=True, append=True)).reshape(-1, 2) if counts.any() else ()
+    for first, last in ((int(low), int(high)) for low, high in holes):
+        near = slice(max(0, first - EDGE), first), slice(last, last + EDGE)
+        before, after = (_middle(mean[rows][counts[rows]]) for rows in near)
+        ends = (after if np.isnan(before) else before, before if np.isnan(after) else after)
+        mean[first:last] = np.linspace(*ends, last - first)
+        if first in borders or last in borders:
+            borders |= {first, last}
+    number = np.zeros(len(run), dtype=int)
+    number[sorted(borders - {len(run)})] = 1
+    return Slow(mean, _white(mean, found, gyro, counts), counts, np.cumsum(number))
+
+
+def _middle(values: np.ndarray) -> float:
+    return float(np.median(values)) if values.size else float("nan")
 
 
 def _white(mean: np.ndarray, found: Residuals, gyro: int, counts: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vgyro.fusion.faults.candidate import running_sum
+from vgyro.fusion.faults.candidate import running_sum, weighted_median
 
 SMOOTH = 15  # blocks on each side
 FEWEST_BLOCKS = 64
@@ -50,10 +50,8 @@ def without_temperature(
     change, warming = changes
     if change.size < FEWEST_BLOCKS or not warming.any():
         return mean
-    order = np.argsort(change / np.where(warming == 0, np.inf, warming))
-    heap = np.cumsum(np.abs(warming)[order])
-    place = order[np.searchsorted(heap, 0.5 * heap[-1])]
-    slope = float(change[place] / warming[place])
+    warms = warming != 0
+    slope = weighted_median(change[warms] / warming[warms], np.abs(warming[warms]))
     if np.abs(change - slope * warming).sum() > (1.0 - LEAST_GAIN) * np.abs(change).sum():
         return mean
     return mean - slope * (temperature - temperature[0])

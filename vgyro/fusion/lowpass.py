@@ -1,0 +1,67 @@
+"""How late the whole array is: by the low-passes that data sheets give, or that the motion itself shows.
+
+White noise that a low-pass has coloured correlates from one sample to the next by φ, a pole of the time constant
+-T/ln φ, which would delay the motion by as much. But noise can be coloured where the motion is not late. So it is
+believed only where the gyros differ in colour, and the delays between them, seen in the motion, follow their colours.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vgyro.fusion.relative import Relative
+
+SURE = 5.0
+"""Spread of the delays that the colours explain, over its standard error."""
+EXPLAINED = 0.5
+"""What the colours leave of the delays' spread, at most."""
+
+
+def array_delay(relative: Relative | None, phi: np.ndarray, period: float, declared: np.ndarray) -> tuple[float, str]:
+    """Delay of the mean of the gyros, s, and how it is known; 0 and a note where it is not.
+
+    relative : the gyros' delays about their mean;  phi [N] : correlation of the noise from one sample to the next
+    declared : [N] Hz, -3 dB frequency of each gyro's first-order low-pass; NaN: not known
+    What a gyro is late beyond its low-pass counts from the array's median on.
+    """
+    if relative is None:
+        return 0.0, ""
+    delay = relative.value[:, 1]
+    if np.isfinite(declared).all():
+        tau = 1.0 / (2.0 * math.pi * declared)
+        how = "low-pass as declared"
+    else:
+        tau = pole_times(phi, period)
+        if not _follows(delay, tau, np.sqrt(np.diagonal(relative.covariance[1]))):
+            slowest = float(tau.max())
+            note = (
+                f"the noise is coloured as by a low-pass at {1.0 / (2.0 * math.pi * slowest):.3g} Hz, "
+                if slowest
+                else ""
+            )
+            return 0.0, note and note + "which is not undone: no lowpass_hz is declared, and no delay shows it"
+        how = "low-pass by the colour of the noise, and delays between the gyros that follow it"
+    beyond = delay - tau
+    late = float(np.mean(tau + beyond - np.median(beyond)))
+    return late, f"{how}: the array's delay of {1000.0 * late:.3g} ms is undone"
+
+
+def pole_times(phi: np.ndarray, period: float) -> np.ndarray:
+    """Time constants, s, of the first-order low-passes that make white noise correlate by phi from one sample to the
+    next: -T/ln φ; 0 where φ is 0."""
+    coloured = phi > 0.0
+    return np.where(coloured, -period / np.log(np.where(coloured, phi, 0.5)), 0.0)
+
+
+def _follows(delay: np.ndarray, tau: np.ndarray, error: np.ndarray) -> bool:
+    """Do the delays follow the colours? One gyro of four or more may be late by itself."""
+
+    def misfit(values: np.ndarray) -> float:
+        apart = np.sort(np.abs(values - np.median(values)))
+        return float(apart[: len(apart) - (len(apart) > 3)].sum())
+
+    by_colour = misfit(tau)
+    usual = float(np.median(error)) * math.sqrt(len(delay))
+    return by_colour > SURE * usual and misfit(delay - tau) < EXPLAINED * by_colour and bool((tau > 0).all())
