@@ -92,13 +92,13 @@ def test_noise_of_pieces_with_holes(phi):
 
 
 def test_estimated_risk_is_that_of_the_smoother():
-    # Known truth: motion of three poles, 12 seeds; two models that are wrong, with q from too little to too much. The
-    # mean of the estimates is the mean of the true squared errors within 4 %.
+    # Known truth: motion of three poles, 24 seeds; two models that are wrong, with q from too little to too much. The
+    # mean of the estimates is the mean of the true squared errors, within three standard errors of that.
     samples = 15_000
     for model, order, width in (("jerk", 3, 1.0), ("jerk", 3, 3.0), ("random_walk", 1, 12.0), ("acceleration", 2, 3.0)):
         q = R / RATE_HZ * (2 * math.pi * width) ** (2 * order)
         motion, estimated, true = Motion(model, {"q": q}, RATE_HZ), [], []
-        for seed in range(12):
+        for seed in range(24):
             truth = poles(seed, samples)
             z = truth + white(seed, samples)
             found = spectrum(gather(z, R, one_stretch(z), RATE_HZ, 0.0, None), RATE_HZ)
@@ -106,7 +106,8 @@ def test_estimated_risk_is_that_of_the_smoother():
             estimated.append(float(found.risk(signal)) / found.weight.sum())
             error = smooth(z, R, one_stretch(z), RATE_HZ, motion).rate - truth
             true.append(np.mean(error[500:-500] ** 2) / R)
-        assert np.mean(estimated) == pytest.approx(np.mean(true), rel=0.04)
+        apart = np.array(estimated) - np.array(true)
+        assert abs(apart.mean()) < 3.0 * apart.std(ddof=1) / math.sqrt(len(apart))
 
 
 def test_no_leakage_from_eight_decades():
@@ -149,7 +150,9 @@ def test_samples_far_off_are_no_motion(sort):
     for seed in range(4):
         rng, truth = np.random.default_rng(seed), poles(seed, 20_000)
         noise = rng.standard_t(3, 20_000) / math.sqrt(3) if sort == "t3" else rng.standard_normal(20_000)
-        noise[rng.random(20_000) < (0.02 if sort == "outliers" else 0.0)] *= 10.0
+        if sort == "outliers":
+            noise[rng.random(20_000) < 0.02] *= 10.0
+            noise /= math.sqrt(0.98 + 0.02 * 100.0)
         z, known = truth + math.sqrt(R) * noise, truth + white(seed, 20_000)
         runs = [
             smooth(z, R, one_stretch(z), RATE_HZ, choose_motion(one, R, one_stretch(z), RATE_HZ)).rate
@@ -183,7 +186,7 @@ def test_a_broad_vibration_has_a_width():
     turn = math.exp(-2 * math.pi * own * damping / RATE_HZ)
     wave = lfilter([1], [1, -2 * turn * math.cos(2 * math.pi * own / RATE_HZ), turn**2], white(9, samples))
     z = poles(1, samples) + 0.1 * wave / wave.std() + white(1, samples)
-    (line,) = choose_motion(z, R, one_stretch(z), RATE_HZ).lines
+    line = max(choose_motion(z, R, one_stretch(z), RATE_HZ).lines, key=lambda one: one.sd)
     assert line.frequency_hz == pytest.approx(own, rel=0.01)
     assert line.damping == pytest.approx(damping, rel=0.4)
     assert line.sd == pytest.approx(0.1, rel=0.2)

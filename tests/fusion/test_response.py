@@ -68,9 +68,10 @@ def test_smoothers_at_rest_have_the_response_they_declare(array, name):
     assert found.bandwidth_hz == pytest.approx(declared.bandwidth_hz, rel=3e-3)
     assert found.noise_bandwidth_hz == pytest.approx(declared.noise_bandwidth_hz, rel=3e-3)
     own = name not in SEE_RATES_AT_REST
-    assert found.dc_gain == pytest.approx(1.0, abs=1e-9 if own else 1e-3)
+    # Lines that stand out are passed at rest, too: of the sinusoids that measure the response a few do.
+    assert found.dc_gain == pytest.approx(1.0, abs=1e-5 if own else 1e-3)
     # Weights that follow the motion add noise of some 0.02 to the gain of each frequency: at 0.5 Hz that is 6 ms.
-    assert found.delay_s == pytest.approx(0.0, abs=1e-6 if own else 6e-3)
+    assert found.delay_s == pytest.approx(0.0, abs=1e-4 if own else 6e-3)
     pole = declared.bandwidth_hz / math.sqrt(math.sqrt(2) - 1)
     slow = found.frequency < 5
     np.testing.assert_allclose(

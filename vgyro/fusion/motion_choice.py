@@ -20,7 +20,7 @@ from vgyro.config import MOTION_MODELS
 from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError, EngineError
 from vgyro.fusion.motion_evidence import Piece, Spectrum, gather, spectrum
-from vgyro.fusion.motion_lines import fine_bands, peak, single, sinusoid, without_peaks
+from vgyro.fusion.motion_lines import above_neighbours, fine_bands, peak, single, sinusoid, without_peaks
 from vgyro.fusion.motion_models import UNLIMITED, Candidate, Line, Motion
 from vgyro.fusion.motion_search import PRICE, Fit, crossing_of, line_price, refine, search, signal_of, still
 from vgyro.fusion.motion_start import wide_start
@@ -200,15 +200,16 @@ def beside_fixed(
 
     z, r, segment, rate_hz, phi, shared : as in choose_motion
     raises : as choose_motion
+    Noise at rest may have any colour: only what stands out of its neighbours is passed.
     """
     if fixed.model == UNLIMITED:
         return AtRest((), 0.0)
     pieces = gather(z, r, segment, rate_hz, phi, None)
     whole = spectrum(pieces, rate_hz)
     bare = Fit(fixed.model, fixed.parameters, (), np.empty(0), 0.0, 0.0)
-    found = _lines(pieces, whole, bare, shared)
+    found = _lines(pieces, above_neighbours(whole), bare, shared)
     lines = tuple(line for line in found.lines if line.damping < WIDE)
-    rest = fine_bands(found.whole, [line.frequency_hz for line in lines])
+    rest = fine_bands(spectrum(found.pieces, rate_hz).without(found.foreign), [line.frequency_hz for line in lines])
     return AtRest((*found.sinusoids, *lines), _lost(rest, signal_of(rest, bare, lines)))
 
 

@@ -17,6 +17,8 @@ SKIRT = 8.0
 SHARE, NEARLY_ALL = 0.1, 0.9
 NEIGHBOURS = 13
 """Bands whose median is the spectrum without lines: half an octave."""
+BESIDE = 257
+"""Lines of a periodogram whose median is the noise about one."""
 FINE = 30
 """Lines of the periodogram on either side of a line of the motion that are not merged into bands."""
 
@@ -58,6 +60,17 @@ def without_peaks(spectrum: Spectrum) -> Spectrum:
 
     power = spectrum.power / spectrum.noise
     return replace(spectrum, power=median_filter(power, NEIGHBOURS, mode="nearest") * spectrum.noise)
+
+
+def above_neighbours(spectrum: Spectrum) -> Spectrum:
+    """All lines, with a noise that is not below the median of BESIDE lines about each: what is broad is no line.
+
+    A periodogram's line is exponential: its median is ln 2 of its mean.
+    """
+    from scipy.ndimage import median_filter
+
+    floor = median_filter(spectrum.power, BESIDE, mode="nearest") / math.log(2.0)
+    return replace(spectrum, noise=np.maximum(spectrum.noise, floor))
 
 
 def peak(spectrum: Spectrum, signal: np.ndarray) -> Peak:
