@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,11 +18,12 @@ from vgyro.fusion.blocks import PIECE, SampleWeights
 from vgyro.fusion.parity_blocks import BlockMoments, block_moments
 from vgyro.fusion.parity_changing import changing_variances
 from vgyro.fusion.parity_colour import colour
-from vgyro.fusion.parity_hat import constant_variances, patterns
+from vgyro.fusion.parity_hat import best_weights, constant_variances, patterns, scaled_to_pairs
 from vgyro.fusion.parity_hat import cornered_hat as cornered_hat
 from vgyro.fusion.parity_hat import pair_variances as pair_variances
 from vgyro.fusion.parity_memory import CONSTANT
-from vgyro.fusion.parity_moving import moving_noise
+from vgyro.fusion.parity_moving import compared, moving_noise
+from vgyro.fusion.parity_quiet import against, good_blocks, quiet_noise
 from vgyro.fusion.parity_rest import Resting, resting_noise
 from vgyro.fusion.weights import min_variance_weights
 
@@ -67,19 +69,28 @@ class Variances:
         return self.stop - self.start
 
     def weights(self, engine: str = "native") -> np.ndarray:
-        """Minimum-variance weights [M, N] of R_t = σσ'∘C: Σ = 1, not negative, 0 where excluded; equal if all are."""
+        """Minimum-variance weights [M, N] of R_t = σσ'∘C: Σ = 1, 0 where excluded; equal if all are.
+
+        Of either sign where the correlation is the same all the time, since it is known from many samples; not negative
+        where it moves.
+        """
+        if self.moving is None:
+            weights = best_weights(self.variance, self.excluded, self.correlation).weights
+        else:
+            weights = self._bounded(self.moving, engine)
+        weights[self.excluded.all(axis=1)] = 1.0 / self.gyros
+        return weights
+
+    def _bounded(self, moving: np.ndarray, engine: str) -> np.ndarray:
         weights = np.zeros(self.variance.shape)
         sigma = np.sqrt(self.variance)
         for pattern, rows in patterns(self.excluded):
             kept = np.flatnonzero(~pattern)
-            part = self.correlation[np.ix_(kept, kept)]
             for begin in range(0, len(rows), PIECE):
                 piece = rows[begin : begin + PIECE]
                 here = np.ix_(piece, kept)
-                if self.moving is not None:
-                    part = self.moving[np.ix_(piece, kept, kept)]
+                part = moving[np.ix_(piece, kept, kept)]
                 weights[here] = min_variance_weights(sigma[here][:, :, None] * sigma[here][:, None, :] * part, engine)
-        weights[self.excluded.all(axis=1)] = 1.0 / self.gyros
         return weights
 
     def block_of_sample(self) -> np.ndarray:
@@ -129,6 +140,9 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
         raise CannotRun(f"fewer than {FEWEST_BLOCKS} blocks with two good gyros", remedy="a longer recording is needed")
     correlation = _correlation(array)
     constant, outlier = constant_variances(moments, correlation)
+    quiet = False
+    if parameters.has("quiet") and not array.at_rest.all():
+        constant, outlier, correlation, quiet = _in_quiet(array, moments, constant, outlier, correlation)
     variance = np.broadcast_to(constant, moments.excluded.shape)
     memories = [CONSTANT] * gyros
     moving = None
@@ -138,7 +152,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     tau = np.array([memory.tau_s for memory in memories])
     changes = np.array([len(memory.points) for memory in memories])
     phi = colour(array, moments, constant)
-    note = _note(moments, correlation, gyros, changing and bool(array.at_rest.all()), moving)
+    note = _note(moments, correlation, gyros, changing and bool(array.at_rest.all()), moving, quiet)
     return Variances(
         moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note, moving
     )  # fmt: skip
@@ -155,6 +169,11 @@ def _changing(
     found = changing_variances(moments, constant, outlier, correlation, block_s, engine)
     both = moving_noise(moments, constant, correlation, block_s, found, engine)
     if both is None:
+        rivals = compared(moments, constant, correlation, found)
+        if rivals is not None and rivals.still <= rivals.changing:
+            # An outlier has the variance that it shows.
+            shown = np.maximum(constant, np.where(found.outlier, found.square, 0.0))
+            return Resting(shown, [CONSTANT] * len(constant), correlation, None)
         return Resting(found.variance, found.memories, correlation, None)
     memory = replace(CONSTANT, keep=math.exp(-block_s / both.tau_s), tau_s=both.tau_s)
     return Resting(both.variance, [memory] * len(constant), correlation, both.correlation)
@@ -173,11 +192,38 @@ def _correlation(array: ArrayRates) -> np.ndarray:
     return measured if np.linalg.eigvalsh(measured)[0] >= SMALLEST_EIGENVALUE else np.eye(len(measured))
 
 
+def _in_quiet(
+    array: ArrayRates, moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Variances [N], outliers and correlation as the frequencies show them at which the motion is small.
+
+    Only where that is clearly more likely than what the record and the differences say (vgyro.fusion.parity_quiet).
+    """
+    best = best_weights(constant[None], np.zeros((1, len(constant)), dtype=bool), correlation).weights[0]
+    found = quiet_noise(array, best, partial(good_blocks, moments))
+    sigma = np.sqrt(constant)
+    off = np.eye(len(constant)) - best
+    expected = np.outer(sigma, sigma) * correlation
+    expected *= len(constant) / float(np.trace(off @ expected @ off.T))
+    if found is None or against(found, expected) <= 0.0:
+        return constant, outlier, correlation, False
+    covariance = scaled_to_pairs(found.noise(correlation), moments, outlier)
+    own = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    if not (own > 0).all():
+        return constant, outlier, correlation, False
+    seen = covariance / np.outer(own, own)
+    if np.linalg.eigvalsh(seen)[0] < SMALLEST_EIGENVALUE:
+        return constant, outlier, correlation, False
+    return own**2, outlier, seen, True
+
+
 def _note(
-    moments: BlockMoments, correlation: np.ndarray, gyros: int, resting: bool, moving: np.ndarray | None
+    moments: BlockMoments, correlation: np.ndarray, gyros: int, resting: bool, moving: np.ndarray | None, quiet: bool
 ) -> str:  # fmt: skip
     if resting:
         notes = ["at rest as a whole: noise of the rates themselves"]
+    elif quiet:
+        notes = ["correlations of the noise from the frequencies at which the motion is small"]
     else:
         notes = ["noise common to all gyros is in no difference between them"]
         if np.array_equal(correlation, np.eye(gyros)):

@@ -162,22 +162,45 @@ def second_moments(moments: BlockMoments) -> np.ndarray:
     return _without_slow(moments, np.ones(len(moments.start), dtype=bool))
 
 
-def most_likely(square: np.ndarray, moments: BlockMoments, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
-    """Variances [N] of the greatest likelihood for second moments [M, N, N] a sample of the blocks `used` [M]."""
+def _totals(
+    square: np.ndarray, moments: BlockMoments, used: np.ndarray
+) -> tuple[list[np.ndarray], list[float], list[np.ndarray]]:
+    """Of each set of good gyros: mean second moments [N, N], samples, and which they are [N]."""
     totals, counts, kept = [], [], []
     for pattern, rows in patterns(moments.excluded):
         mine = rows[used[rows]]
         if len(mine) and (~pattern).sum() > 1:
             size = moments.size[mine].astype(float)
             totals.append(np.einsum("b,bij->ij", size, square[mine]) / size.sum())
-            counts.append(size.sum())
+            counts.append(float(size.sum()))
             kept.append(~pattern)
+    return totals, counts, kept
+
+
+def _pairs(totals: list[np.ndarray], counts: list[float], kept: list[np.ndarray]) -> np.ndarray:
+    """Variances of the differences [N, N]; NaN where two gyros were never good together."""
+    share = np.array([np.outer(good, good) * count for good, count in zip(kept, counts, strict=True)])
+    with np.errstate(invalid="ignore"):
+        found: np.ndarray = (share * pair_variances(np.array(totals))).sum(axis=0) / share.sum(axis=0)
+    return found
+
+
+def scaled_to_pairs(covariance: np.ndarray, moments: BlockMoments, outlier: np.ndarray) -> np.ndarray:
+    """A covariance [N, N] that is known but for its size, with the differences' mean variance, (deg/s)² a sample."""
+    used = np.logical_not(outlier.any(axis=1))
+    pairs = _pairs(*_totals(_without_slow(moments, used), moments, used))
+    known = np.isfinite(pairs) & ~np.eye(len(pairs), dtype=bool)
+    scaled: np.ndarray = covariance * (pairs[known].sum() / pair_variances(covariance)[known].sum())
+    return scaled
+
+
+def most_likely(square: np.ndarray, moments: BlockMoments, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
+    """Variances [N] of the greatest likelihood for second moments [M, N, N] a sample of the blocks `used` [M]."""
+    totals, counts, kept = _totals(square, moments, used)
     gyros = square.shape[1]
     if not totals:
         return np.ones(gyros)
-    share = np.array([np.outer(good, good) * count for good, count in zip(kept, counts, strict=True)])
-    with np.errstate(invalid="ignore"):
-        pairs = (share * pair_variances(np.array(totals))).sum(axis=0) / share.sum(axis=0)
+    pairs = _pairs(totals, counts, kept)
     variance = cornered_hat(pairs)
     seen = np.array(kept).any(axis=0)
     middle = float(np.median(variance[seen])) or float(np.mean(variance[seen])) or 1.0

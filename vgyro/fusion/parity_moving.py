@@ -128,6 +128,41 @@ def differences(kept: np.ndarray, gyros: int) -> np.ndarray:
     return basis
 
 
+@dataclass(frozen=True)
+class Rivals:
+    """Deviances of constant variances and of those that change alone, prices included; less is better.
+
+    square [M, N, N] : see squares_of_pairs
+    """
+
+    score: Score
+    square: np.ndarray
+    still: float
+    changing: float
+
+
+def compared(
+    moments: BlockMoments, constant: np.ndarray, correlation: np.ndarray, changing: Changing
+) -> Rivals | None:  # fmt: skip
+    """Constant [N] variances against those that change, each block predicted from the others; None: no block tells.
+
+    correlation [N, N]; prices as in chosen_memory
+    """
+    columns = zip(changing.square.T, changing.freedom.T, strict=True)
+    shares = [effective_share(*one) for one in columns if one[1].any()]
+    if not shares:
+        return None
+    square = squares_of_pairs(moments, ~moments.excluded & ~changing.outlier)
+    score = Score(moments, square, changing.outlier, moments.size * float(np.mean(shares)))
+    if len(score.rows) == 0:
+        return None
+    still = np.broadcast_to(constant, changing.alone[score.rows].shape)
+    price = _price(changing.memories, score, len(moments.size))
+    return Rivals(
+        score, square, score(still, correlation), score(changing.alone[score.rows], correlation) + price
+    )  # fmt: skip
+
+
 def moving_noise(
     moments: BlockMoments, constant: np.ndarray, correlation: np.ndarray, block_s: float, changing: Changing,
     engine: str = "native",
@@ -139,21 +174,16 @@ def moving_noise(
     Prices: for the time constant and the N + 1 changes log Σν each, those of `changing` as in chosen_memory.
     """
     gyros = len(constant)
-    if not FEWEST_GYROS <= gyros <= MOST_GYROS or not changing.freedom.any():
+    rivals = None
+    if FEWEST_GYROS <= gyros <= MOST_GYROS:
+        rivals = compared(moments, constant, correlation, changing)
+    if rivals is None:
         return None
-    columns = zip(changing.square.T, changing.freedom.T, strict=True)
-    share = float(np.mean([effective_share(*one) for one in columns if one[1].any()]))
-    square = squares_of_pairs(moments, ~moments.excluded & ~changing.outlier)
-    score = Score(moments, square, changing.outlier, moments.size * share)
-    if len(score.rows) == 0:
-        return None
-    still = np.broadcast_to(constant, changing.alone[score.rows].shape)
-    price = _price(changing.memories, score, len(moments.size))
-    rivals = score(still, correlation), score(changing.alone[score.rows], correlation) + price
+    score, square = rivals.score, rivals.square
     pairs = _Pairs(moments, square, constant, changing.outlier, correlation)
     low_pass = engines.get(engine).kalman.low_pass
     freedom = float(np.median(score.freedom))
-    best, least, last = math.inf, min(rivals) - (gyros + 2) * score.price, math.inf
+    best, least, last = math.inf, min(rivals.still, rivals.changing) - (gyros + 2) * score.price, math.inf
     for tau in TIME_CONSTANTS_S:
         if tau < FEWEST_BLOCKS * block_s:
             continue

@@ -9,6 +9,7 @@ PARTS: dict[str, str] = {
     "quantised": "no gyro is better than its step allows",
     "response": "scale factors, delays and poles relative to the array, from the motion",
     "pole": "the sensor's low-pass is undone where it is declared or the motion shows it",
+    "quiet": "correlations of the noise from the frequencies at which the motion is small",
     "changing": "variances that change with time",
     "segments": "change points of the variances",
     "changing_correlation": "correlations that change with time",

@@ -18,6 +18,8 @@ import numpy as np
 
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.events import excluded
+from vgyro.fusion.parity_quiet import quiet_noise
+from vgyro.fusion.weights import min_variance_weights, usable
 
 HIGH_PASS_S = 30.0
 """A motion that is slower is not told from biases."""
@@ -118,20 +120,37 @@ def used(array: ArrayRates) -> np.ndarray:
 
 
 def reference(array: ArrayRates, good: np.ndarray) -> tuple[np.ndarray, float]:
-    """Inverse-variance mean of the good gyros [T], deg/s, and the variance of its white noise, (deg/s)² a sample.
+    """Mean of the good gyros of least variance [T], deg/s, and the variance of its white noise, (deg/s)² a sample.
 
     So weighed its noise is in no difference, and no noise is taken for an answer to the motion. Where no gyro is good
     all of them count.
     """
-    variance = _white(array, good)
-    shares = 1.0 / variance
+    shares, noise = array.once("reference", lambda: _shares(array, good))
     total, number = np.zeros(len(array.rate)), np.zeros(len(array.rate))
     none = ~good.any(axis=1)
     for gyro, share in enumerate(shares.tolist()):
         counts = good[:, gyro] | none
         total += share * np.where(counts, array.rate[:, gyro], 0.0)
         number += share * counts
-    return total / number, 1.0 / float(shares.sum())
+    return total / np.where(number > 0, number, 1.0), noise
+
+
+def _shares(array: ArrayRates, good: np.ndarray) -> tuple[np.ndarray, float]:
+    """Weights of least variance [N], Σ = 1, and that variance: of the noise at the frequencies with little motion.
+
+    Where these say nothing, of the steps between neighbouring samples, as if no gyro's noise were another's.
+    """
+    shares = 1.0 / _white(array, good)
+    noise, shares = 1.0 / float(shares.sum()), shares / shares.sum()
+    lost = np.concatenate([np.zeros((1, good.shape[1]), dtype=np.int64), np.cumsum(~good, axis=0)])
+    quiet = quiet_noise(array, shares, lambda starts, length: np.equal(lost[starts + length], lost[starts]))
+    if quiet is None:
+        return shares, noise
+    covariance = quiet.variance * quiet.noise(np.eye(len(shares)))
+    if not usable(covariance[None])[0]:
+        return shares, noise
+    shares = min_variance_weights(covariance)
+    return shares, float(shares @ covariance @ shares)
 
 
 def _white(array: ArrayRates, good: np.ndarray) -> np.ndarray:
