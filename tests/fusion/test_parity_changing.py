@@ -156,7 +156,7 @@ def test_weights_are_those_of_the_dense_covariances():
     array = simulated(9000, 100.0, np.ones(4))
     array = replace(array, rate=white * sigma, noise=replace(array.noise, correlation=correlation))
     found = parity_variances(array, FilterParameters())
-    R = np.sqrt(found.variance[:, :, None] * found.variance[:, None, :]) * correlation
+    R = np.sqrt(found.variance[:, :, None] * found.variance[:, None, :]) * found.correlation
     weights = found.weights()
     np.testing.assert_allclose(weights, min_variance_weights(R), atol=1e-8)
     np.testing.assert_allclose(found.combined_variance(), np.einsum("bi,bij,bj->b", weights, R, weights), rtol=1e-10)

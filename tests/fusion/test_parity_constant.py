@@ -69,14 +69,25 @@ def test_hat_is_never_negative():
     np.testing.assert_allclose(cornered_hat(pairs), [0.0, 5 / 3, 8 / 3], atol=1e-12)
 
 
-def test_two_gyros_share():
+def test_two_gyros_share_where_nothing_tells_them_apart():
+    # Expected: half of the difference's variance each: with "quiet" off, and of two that are alike with it.
     np.testing.assert_allclose(cornered_hat(np.array([[0.0, 3.0], [3.0, 0.0]])), [1.5, 1.5])
     array = simulated(12000, 200.0, [1.0, 2.0], motion(12000, 200.0))
-    found = parity_variances(array, MOVING)
+    found = parity_variances(array, replace(MOVING, without=frozenset({"quiet"})))
     difference = np.diff(array.rate, axis=1).var()
     np.testing.assert_allclose(found.variance, difference / 2.0, rtol=0.002)
     np.testing.assert_allclose(found.weights(), 0.5, atol=1e-12)
     assert "cannot be told apart" in found.note
+    alike = parity_variances(simulated(12000, 200.0, [1.0, 1.0], motion(12000, 200.0)), MOVING)
+    np.testing.assert_allclose(alike.weights(), 0.5, atol=1e-12)
+
+
+def test_two_gyros_are_told_apart_where_the_motion_is_small():
+    # Known truth: variances of 1 and 4, motion of low frequency; no record of the noise at rest.
+    found = parity_variances(simulated(12000, 200.0, [1.0, 2.0], motion(12000, 200.0)), MOVING)
+    np.testing.assert_allclose(found.variance[0], [1.0, 4.0], rtol=0.08)
+    np.testing.assert_allclose(found.weights()[0], [0.8, 0.2], atol=0.03)
+    assert "the motion is small" in found.note
 
 
 def test_block_moments_know_every_residual():

@@ -65,17 +65,18 @@ def test_smoothers_at_rest_have_the_response_they_declare(array, name):
     found = measured_response(METHODS[name].fuse, array, NARROW)
     assert declared.passes == 2
     assert declared.bandwidth_hz == pytest.approx(NARROW.bandwidth_hz, rel=1e-3)
-    assert found.bandwidth_hz == pytest.approx(declared.bandwidth_hz, rel=3e-3)
-    assert found.noise_bandwidth_hz == pytest.approx(declared.noise_bandwidth_hz, rel=3e-3)
     own = name not in SEE_RATES_AT_REST
+    # Weights that follow the motion, of either sign, add noise of some 0.04 to the gain.
+    assert found.bandwidth_hz == pytest.approx(declared.bandwidth_hz, rel=3e-3 if own else 0.03)
+    assert found.noise_bandwidth_hz == pytest.approx(declared.noise_bandwidth_hz, rel=3e-3 if own else 0.03)
     # Lines that stand out are passed at rest, too: of the sinusoids that measure the response a few do.
     assert found.dc_gain == pytest.approx(1.0, abs=1e-5 if own else 1e-3)
-    # Weights that follow the motion add noise of some 0.02 to the gain of each frequency: at 0.5 Hz that is 6 ms.
-    assert found.delay_s == pytest.approx(0.0, abs=1e-4 if own else 6e-3)
+    # Weights that follow the motion add noise of some 0.04 to the gain of each frequency: at 0.5 Hz that is 12 ms.
+    assert found.delay_s == pytest.approx(0.0, abs=1e-4 if own else 0.015)
     pole = declared.bandwidth_hz / math.sqrt(math.sqrt(2) - 1)
     slow = found.frequency < 5
     np.testing.assert_allclose(
-        found.gain[slow], 1 / (1 + (found.frequency[slow] / pole) ** 2), atol=2e-3 if own else 0.02
+        found.gain[slow], 1 / (1 + (found.frequency[slow] / pole) ** 2), atol=2e-3 if own else 0.04
     )
 
 

@@ -28,6 +28,9 @@ from vgyro.fusion.parity_rest import Resting, resting_noise
 from vgyro.fusion.weights import min_variance_weights
 
 FEWEST_BLOCKS = 16
+WORTH = 1.02
+"""Variance that the weights so far have over the least possible, below which they stay: noise that comes and goes makes
+correlations look a little smaller than they are."""
 SMALLEST_EIGENVALUE = 1e-3
 """A correlation matrix with a smaller one is too near to singular to weight by."""
 
@@ -200,7 +203,8 @@ def _in_quiet(
     Only where that is clearly more likely than what the record and the differences say (vgyro.fusion.parity_quiet).
     """
     best = best_weights(constant[None], np.zeros((1, len(constant)), dtype=bool), correlation).weights[0]
-    found = quiet_noise(array, best, partial(good_blocks, moments))
+    clean = replace(moments, excluded=moments.excluded | outlier)
+    found = quiet_noise(array, best, partial(good_blocks, clean))
     sigma = np.sqrt(constant)
     off = np.eye(len(constant)) - best
     expected = np.outer(sigma, sigma) * correlation
@@ -213,6 +217,8 @@ def _in_quiet(
         return constant, outlier, correlation, False
     seen = covariance / np.outer(own, own)
     if np.linalg.eigvalsh(seen)[0] < SMALLEST_EIGENVALUE:
+        return constant, outlier, correlation, False
+    if float(best @ covariance @ best) < WORTH / float(np.linalg.inv(covariance).sum()):
         return constant, outlier, correlation, False
     return own**2, outlier, seen, True
 
