@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from vgyro import engine as engines
-from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights, min_variance_weights
+from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.parity import parity_variances
 from vgyro.fusion.parity_memory import Memory, chosen_memory, effective_share
@@ -149,7 +149,7 @@ def test_faulty_array_in_motion(seed):
 
 
 def test_weights_are_those_of_the_dense_covariances():
-    # Expected: min_variance_weights of R_t = σσ'∘C, block by block.
+    # Expected: R⁻¹1/(1'R⁻¹1) of R_t = σσ'∘C, block by block, of either sign.
     correlation = np.full((4, 4), 0.3) + 0.7 * np.eye(4)
     sigma = 1.0 + np.outer(np.arange(9000) >= 4000, [2.0, 0.0, 0.0, 0.5])
     white = np.random.default_rng(5).standard_normal((9000, 4)) @ np.linalg.cholesky(correlation).T
@@ -158,7 +158,8 @@ def test_weights_are_those_of_the_dense_covariances():
     found = parity_variances(array, FilterParameters())
     R = np.sqrt(found.variance[:, :, None] * found.variance[:, None, :]) * found.correlation
     weights = found.weights()
-    np.testing.assert_allclose(weights, min_variance_weights(R), atol=1e-8)
+    solved = np.linalg.solve(R, np.ones((len(R), 4, 1)))[..., 0]
+    np.testing.assert_allclose(weights, solved / solved.sum(axis=1, keepdims=True), atol=1e-8)
     np.testing.assert_allclose(found.combined_variance(), np.einsum("bi,bij,bj->b", weights, R, weights), rtol=1e-10)
     assert np.ptp(weights[:, 0]) > 0.1
 
