@@ -106,7 +106,7 @@ def manifest_text(
 def _array(array: ArrayDraft) -> Iterator[str]:
     fields = LogGyro.model_fields
     yield f"# {Manifest.model_fields['array'].description}; keys of a gyro:\n"
-    for name in ("column", "axis", "sign", "unit", "scale", "bias", "range_deg_s"):
+    for name in ("column", "axis", "sign", "unit", "scale", "bias", "range_deg_s", "lowpass_hz"):
         yield f"#   {name}: {fields[name].description}\n"
     yield "array:\n  gyros:\n"
     said = ""

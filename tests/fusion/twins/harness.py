@@ -122,9 +122,11 @@ def case(
         at_rest[(simulated.time >= start) & (simulated.time < stop)] = True
     added = rate * ~at_rest if rest is not None else np.full(samples, rate)
     rates = np.asfortranarray(simulated.rates - offset + added[:, None])
+    pole = pole_of(twin, twin.recording(recording))
     array = ArrayRates(
         rates, simulated.rate_hz, np.zeros(samples, dtype=np.int32), at_rest, noise_of(twin, seed),
         temperature=simulated.temperature, stretch_time=np.zeros(1),
+        lowpass_hz=None if pole is None else np.full(rates.shape[1], pole),
     )  # fmt: skip
     options = twin.analysis.fusion.model_dump(exclude_unset=True) if twin.analysis else {}
     options = FusionOptions.model_validate({**options, "methods": "all"})
