@@ -158,6 +158,21 @@ def test_delays_that_follow_the_colours() -> None:
     assert late == pytest.approx(np.mean(MIXED), rel=1e-9)
 
 
+@pytest.mark.parametrize(("error_ms", "undone"), [(1.1, True), (1.3, False)])
+def test_delays_follow_the_colours_only_if_they_are_sure(error_ms: float, undone: bool) -> None:
+    """Less one of the two late gyros, the χ² of four at 3.979 ms and one at 7.958 is .8·(3.979 ms/error)²: 9 at 1.186."""
+    late, _ = array_delay(of_delays(MIXED, error_ms / 1000.0), colours(MIXED), 0.005, UNKNOWN)
+    assert (late > 0.0) == undone
+
+
+@pytest.mark.parametrize(("other_ms", "undone"), [(2.0, True), (4.5, False)])
+def test_delays_that_have_another_cause_are_no_evidence(other_ms: float, undone: bool) -> None:
+    """Delays of two gyros that no colour explains: the χ² left is below half of all, or above."""
+    delays = np.array(MIXED) + np.array([other_ms, -other_ms, 0, 0, 0, 0]) / 1000.0
+    late, _ = array_delay(of_delays(delays.tolist()), colours(MIXED), 0.005, UNKNOWN)
+    assert (late > 0.0) == undone
+
+
 def test_one_gyro_may_be_late_by_itself() -> None:
     delays = np.array(MIXED) + np.array([0, 0, 0, 0, 0.015, 0])
     late, _ = array_delay(of_delays(delays.tolist()), colours(MIXED), 0.005, UNKNOWN)

@@ -13,10 +13,13 @@ import numpy as np
 
 from vgyro.fusion.relative import Relative
 
-SURE = 5.0
-"""Spread of the delays that the colours explain, over its standard error."""
+SURE = 3.0
+"""Standard deviations (root of the χ²) by which the colours must explain the delays better than no delay does.
+
+Where the gyros are alike the χ² speaks against the colours by as much as they are apart: chance hardly gets here.
+"""
 EXPLAINED = 0.5
-"""What the colours leave of the delays' spread, at most."""
+"""What the colours leave of the delays' χ², at most: delays that have another cause, too, are no evidence of poles."""
 
 
 def array_delay(relative: Relative | None, phi: np.ndarray, period: float, declared: np.ndarray) -> tuple[float, str]:
@@ -57,11 +60,14 @@ def pole_times(phi: np.ndarray, period: float) -> np.ndarray:
 
 def _follows(delay: np.ndarray, tau: np.ndarray, error: np.ndarray) -> bool:
     """Do the delays follow the colours? One gyro of four or more may be late by itself."""
+    if not (error > 0).all():
+        return False
 
     def misfit(values: np.ndarray) -> float:
-        apart = np.sort(np.abs(values - np.median(values)))
-        return float(apart[: len(apart) - (len(apart) > 3)].sum())
+        counts = 1.0 - np.eye(len(values)) if len(values) > 3 else np.ones((1, len(values)))
+        weight = counts / error**2
+        mean = (weight @ values) / weight.sum(axis=1)
+        return float((weight * (values - mean[:, None]) ** 2).sum(axis=1).min())
 
-    by_colour = misfit(tau)
-    usual = float(np.median(error)) * math.sqrt(len(delay))
-    return by_colour > SURE * usual and misfit(delay - tau) < EXPLAINED * by_colour and bool((tau > 0).all())
+    alike, follow = misfit(delay), misfit(delay - tau)
+    return alike - follow > SURE**2 and follow < EXPLAINED * alike and bool((tau > 0).all())
