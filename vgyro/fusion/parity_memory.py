@@ -74,7 +74,7 @@ def chosen_memory(square: np.ndarray, freedom: np.ndarray, block_s: float, low_p
     each change point, whose place the block itself had a say in.
     """
     none = np.empty(0, dtype=np.int64)
-    if not freedom.any():
+    if not freedom.any() or not square[freedom > 0].any():
         return Memory(none, 1.0, math.inf)
     scaled = freedom * effective_share(square, freedom)
     points = change_points(square, scaled)

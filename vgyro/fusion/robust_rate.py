@@ -94,7 +94,7 @@ def first_setting(looks: Sequence[Look], rate_hz: float, density: ScaleMixture, 
     pairs = used[:, 1:] & used[:, :-1]
     steps = np.abs(np.diff(values - common, axis=1))
     usual = MAD / np.sqrt(2.0) * np.array([_median(one[good]) for one, good in zip(steps, pairs, strict=True)])
-    stand_in = _median(usual[usual > 0]) or 1.0
+    stand_in = _median(usual[usual > 0]) or _median(least[least > 0]) or 1.0
     usual = np.maximum(np.where(usual > 0, usual, stand_in), least)
     windows = (max(FEWEST_CENTRE, round(CENTRE_S * rate_hz)), max(FEWEST_SIZE, round(SIZE_S * rate_hz)))
     return Setting([density] * len(values), usual, offset, *windows)
