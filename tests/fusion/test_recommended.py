@@ -95,6 +95,17 @@ def test_posterior_deviation_at_rest_counts_the_colour(make_array):
     assert 0.7 < np.mean(values) < 1.3
 
 
+def test_posterior_deviation_at_rest_is_of_the_noise_not_of_a_vibration(make_array):
+    """Simulated truth: a vibration of .5 deg/s that all see, which the smoother passes; its noise is that without it."""
+    errors = []
+    for seed in range(4):
+        array = make_array(24_000, [0.2, 0.2, 0.2, 0.2], seed=seed)
+        truth = 0.5 * np.sin(2 * math.pi * 5.0 * np.arange(24_000) / RATE_HZ)
+        fused = METHODS["recommended"].fuse(replace(array, rate=array.rate + truth[:, None]), STILL)
+        errors.append(np.mean(((fused.rate - truth) / fused.sd)[1000:-1000] ** 2))
+    assert np.mean(errors) == pytest.approx(1.0, abs=0.35)
+
+
 def test_the_motion_is_chosen_once(make_array):
     array = make_array(12_000, [0.1, 0.1, 0.2, 0.1], truth=motion(12_000), at_rest=False)
     chosen = shared_motion(array, MOVING)

@@ -33,6 +33,8 @@ AROUND = 1.2
 """Whether a line has a width is seen from the spectrum within this factor of its frequency."""
 SURE = 4.0
 """Standard errors above which there is motion that is not passed."""
+LEAST_NOISE = 1e-3
+"""Noise at rest, over the variance of the samples, at least: the size of a vibration is not known better than that."""
 SPENT = 4.0
 """Risk of the amplitude and the phase of a sinusoid, both passed as they are."""
 CHECKED = 1 << 14
@@ -181,10 +183,12 @@ class AtRest:
     """What a recording at rest has beside the fixed bandwidth of its smoother.
 
     lines : vibrations, which are passed;  lost : variance of what else is seen of motion and is not passed, (deg/s)²
+    noise : part of the variance of the samples that is not the vibrations'
     """
 
-    lines: tuple[Line, ...]
-    lost: float
+    lines: tuple[Line, ...] = ()
+    lost: float = 0.0
+    noise: float = 1.0
 
 
 def beside_fixed(
@@ -203,14 +207,23 @@ def beside_fixed(
     Noise at rest may have any colour: only what stands out of its neighbours is passed.
     """
     if fixed.model == UNLIMITED:
-        return AtRest((), 0.0)
+        return AtRest()
     pieces = gather(z, r, segment, rate_hz, phi, None)
     whole = spectrum(pieces, rate_hz)
     bare = Fit(fixed.model, fixed.parameters, (), np.empty(0), 0.0, 0.0)
     found = _lines(pieces, above_neighbours(whole), bare, shared)
     lines = tuple(line for line in found.lines if line.damping < WIDE)
     rest = fine_bands(spectrum(found.pieces, rate_hz).without(found.foreign), [line.frequency_hz for line in lines])
-    return AtRest((*found.sinusoids, *lines), _lost(rest, signal_of(rest, bare, lines)))
+    lost = _lost(rest, signal_of(rest, bare, lines))
+    return AtRest((*found.sinusoids, *lines), lost, _not_vibration(pieces, found.pieces, lines))
+
+
+def _not_vibration(pieces: Sequence[Piece], left: Sequence[Piece], lines: Sequence[Line]) -> float:
+    """Part of the variance of the pieces that is in those without the sinusoids `left`, and not of the lines."""
+    total = sum(float(piece.z @ piece.z) for piece in pieces)
+    samples = sum(len(piece.z) for piece in pieces)
+    noise = sum(float(piece.z @ piece.z) for piece in left) - samples * sum(line.sd**2 for line in lines)
+    return max(noise / total, LEAST_NOISE) if total > 0 else 1.0
 
 
 def _bare(bands: Spectrum) -> Fit:

@@ -203,13 +203,14 @@ def _standstill(
 
 def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> tuple[Smoothed, np.ndarray]:
     """The smoother of a fixed bandwidth, and the variance [T] of what it gives where the noise changes."""
-    mean = mean_variance(np.asarray(signal.variance))
-    motion = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)
     besides = shared_vibration(array, parameters)
-    motion = replace(motion, lines=besides.lines)
+    # At rest the variance of the samples is that of the noise, and of what vibrates.
+    variance = np.asarray(signal.variance) * besides.noise
+    mean = mean_variance(variance)
+    motion = replace(fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz), lines=besides.lines)
     result = smooth(signal.rate, mean, array.segment, array.rate_hz, motion, 0.0, parameters.engine)
     # Where no gyro says anything the rate at rest is that of the samples about it.
-    told = np.where(np.isfinite(signal.variance), signal.variance, mean)
+    told = np.where(np.isfinite(variance), variance, mean)
     share = np.broadcast_to(told / mean, array.segment.shape)
     if math.isfinite(result.bandwidth_hz):
         # Far below the sensor's pole coloured noise is white noise of its long-run variance.
@@ -223,7 +224,7 @@ def shared_vibration(array: ArrayRates, parameters: FilterParameters) -> AtRest:
 
     def find() -> AtRest:
         if not parameters.has("lines"):
-            return AtRest((), 0.0)
+            return AtRest()
         known = analysed(array, parameters)
         mean = mean_variance(known.variance())
         fixed = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)
