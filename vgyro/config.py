@@ -99,7 +99,9 @@ class FusionOptions(StrictModel):
     moment_window_s: float = Field(360.0, gt=0, description="window of the rolling second-moment weights, s")
     ewma_time_s: float = Field(60.0, gt=0, description="time constant of the exponentially weighted moments, s")
     motion_models: tuple[MotionModel, ...] = Field(
-        MOTION_MODELS, min_length=1, description="models of the rate from which the smoother chooses by likelihood"
+        MOTION_MODELS,
+        min_length=1,
+        description="models of the rate; the smoother takes that of the least estimated error",
     )
     anchors: Switch = Field("auto", description="auto: pin the bias where the board stands still between motion; off")
     temperature: Switch = Field("auto", description="auto: regress the bias on the logged temperature; off: never")

@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import METHODS, FilterParameters, SampleWeights
+from vgyro.fusion import smoothed as smoothed_rows
 from vgyro.fusion.analysed import DCC, analysed, shared_motion
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.lowpass import pole_times
+from vgyro.fusion.motion_models import Motion
 from vgyro.fusion.parity import shared_variances
 from vgyro.fusion.recommended import static_weights
-from vgyro.fusion.smoothed import without_pole
+from vgyro.fusion.smoothed import Signal, without_pole
+from vgyro.fusion.smoother import Smoothed
 
 RATE_HZ = 200.0
 STILL = FilterParameters(bandwidth_hz=1.0)
@@ -96,7 +99,7 @@ def test_posterior_deviation_at_rest_counts_the_colour(make_array):
 
 
 def test_posterior_deviation_at_rest_is_of_the_noise_not_of_a_vibration(make_array):
-    """Simulated truth: a vibration of .5 deg/s that all see, which the smoother passes; its noise is that without it."""
+    """Simulated truth: a vibration of .5 deg/s that all see, which is passed; the noise is what is left."""
     errors = []
     for seed in range(4):
         array = make_array(24_000, [0.2, 0.2, 0.2, 0.2], seed=seed)
@@ -137,6 +140,20 @@ def test_the_pole_of_the_sensors_is_undone(make_array):
     seen = (gain * np.exp(1j * omega * time)).imag
     undone = without_pole(array, seen, tau)
     np.testing.assert_allclose(undone, np.sin(omega * time), atol=1e-6)
+
+
+@pytest.mark.parametrize(("part_of_pole", "undone"), [(0.49, True), (0.51, False)])
+def test_the_pole_is_undone_only_below_half_its_frequency(make_array, monkeypatch, part_of_pole, undone):
+    array, pole_hz = make_array(600, [0.1, 0.1, 0.1]), 40.0
+    rate = np.arange(600.0)
+    found = Smoothed(rate, np.ones(600), Motion("none", {}, RATE_HZ), part_of_pole * pole_hz, 1.0, 0, "")
+    monkeypatch.setattr(smoothed_rows, "_in_motion", lambda *_: found)
+    late_s = 1 / (2 * math.pi * pole_hz)
+    fused = smoothed_rows.smoothed(array, MOVING, Signal(rate, 1.0, 0.0, None, "", late_s=late_s))
+    # Of a ramp of 1 deg/s a sample the derivative is known.
+    np.testing.assert_allclose(fused.rate, rate + undone * late_s * RATE_HZ, rtol=1e-9)
+    assert fused.delay_s == pytest.approx(-late_s * undone)
+    assert ("its delay stays" in fused.note) != undone
 
 
 def test_recommended_has_no_delay_behind_a_pole(make_array):

@@ -185,6 +185,14 @@ def test_a_declared_low_pass_is_believed() -> None:
     assert "declared" in note
 
 
+def test_one_declared_low_pass_is_enough() -> None:
+    """The others are as late about it as the motion shows; one gyro is late by itself."""
+    declared = np.array([np.nan, 40.0, 20.0, np.nan, 40.0, 40.0])
+    delays = np.array(MIXED) + np.array([0, 0, 0, 0, 0.015, 0])
+    late, _ = array_delay(of_delays(delays.tolist()), np.zeros(6), 0.005, declared)
+    assert late == pytest.approx(np.mean(delays), rel=1e-9)
+
+
 def test_pole_times() -> None:
     """φ = e^(-T/τ); 0 where there is no colour."""
     np.testing.assert_allclose(pole_times(np.array([0.0, math.exp(-0.005 / FORTY)]), 0.005), [0.0, FORTY])

@@ -55,11 +55,16 @@ class Analysed:
         """u(t)'(y - b) [T], deg/s, as late as the array is."""
         return combined_without(self.array, self.weights, self.slow)
 
+    @property
+    def undone_s(self) -> float:
+        """`late_s` where no model smooths: 0 where the motion is too fast for a derivative without noise."""
+        return self.late_s if self.relative is not None and self.relative.window > 1 else 0.0
+
     def in_time(self, rate: np.ndarray) -> np.ndarray:
         """The rate [T] without the array's delay, where it is known: late by little against the motion's time."""
-        if not self.late_s or self.relative is None:
+        if not self.undone_s or self.relative is None:
             return rate
-        return rate + self.late_s * smoothed(self.array, rate, self.relative.window, 1)
+        return rate + self.undone_s * smoothed(self.array, rate, self.relative.window, 1)
 
     def variance(self) -> np.ndarray:
         """Variance u'R_t·u of its white noise [T], (deg/s)² a sample; infinite where no gyro says anything."""

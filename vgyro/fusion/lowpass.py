@@ -26,28 +26,24 @@ def array_delay(relative: Relative | None, phi: np.ndarray, period: float, decla
     """Delay of the mean of the gyros, s, and how it is known; 0 and a note where it is not.
 
     relative : the gyros' delays about their mean;  phi [N] : correlation of the noise from one sample to the next
-    declared : [N] Hz, -3 dB frequency of each gyro's first-order low-pass; NaN: not known
-    What a gyro is late beyond its low-pass counts from the array's median on.
+    declared : [N] Hz, -3 dB frequency of each gyro's first-order low-pass; NaN: not known; of one gyro it is enough
+    The array's delay is that of a low-pass less what its gyro is late about the array: the median of the gyros.
     """
     if relative is None:
         return 0.0, ""
-    delay = relative.value[:, 1]
-    if np.isfinite(declared).all():
-        tau = 1.0 / (2.0 * math.pi * declared)
+    delay, told = relative.value[:, 1], np.isfinite(declared)
+    if told.any():
+        late = float(np.median(1.0 / (2.0 * math.pi * declared[told]) - delay[told]))
         how = "low-pass as declared"
     else:
         tau = pole_times(phi, period)
         if not _follows(delay, tau, np.sqrt(np.diagonal(relative.covariance[1]))):
             slowest = float(tau.max())
-            note = (
-                f"the noise is coloured as by a low-pass at {1.0 / (2.0 * math.pi * slowest):.3g} Hz, "
-                if slowest
-                else ""
-            )
-            return 0.0, note and note + "which is not undone: no lowpass_hz is declared, and no delay shows it"
+            why = "which is not undone: no lowpass_hz is declared, and no delay shows it"
+            pole_hz = 1.0 / (2.0 * math.pi * slowest) if slowest else math.nan
+            return 0.0, f"the noise is coloured as by a low-pass at {pole_hz:.3g} Hz, {why}" if slowest else ""
+        late = float(np.median(tau - delay))
         how = "low-pass by the colour of the noise, and delays between the gyros that follow it"
-    beyond = delay - tau
-    late = float(np.mean(tau + beyond - np.median(beyond)))
     return late, f"{how}: the array's delay of {1000.0 * late:.3g} ms is undone"
 
 

@@ -3,7 +3,7 @@
 1. Faults (vgyro.fusion.faults) are left out while they last.
 2. R_t and slow errors b from the differences between the gyros (vgyro.fusion.analysed).
 3. u = minimum-variance weights of R_t;  z = u'(y - b).
-4. The motion: model and parameters by likelihood, two-sided smoother of z with u'R_t·u (vgyro.fusion.smoother).
+4. The motion: the model of the least estimated error, two-sided smoother of z with u'R_t·u (vgyro.fusion.smoother).
    Where the colours of the gyros' noise differ, R_t is scaled to the band that it passes (vgyro.fusion.parity_band).
 5. The array's delay by its sensors' low-pass, where it is declared or the motion shows it, is undone
    (vgyro.fusion.lowpass).
@@ -67,7 +67,7 @@ def passed_hz(array: ArrayRates, parameters: FilterParameters, known: Analysed) 
 def recommended_unsmoothed(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """The same without a model of the motion: u(t)'(y - b), full bandwidth, no delay."""
     known = analysed(array, parameters)
-    return replace(Fused.undelayed(known.in_time(known.rate()), known.weights, known.note), delay_s=-known.late_s)
+    return replace(Fused.undelayed(known.in_time(known.rate()), known.weights, known.note), delay_s=-known.undone_s)
 
 
 def static_weights(array: ArrayRates, parameters: FilterParameters) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Rows of the maximum-likelihood smoother: one fused rate, its variance a sample, and a model of the motion.
+"""Rows of the smoother: one fused rate, its variance a sample, and a model of the motion.
 
 In motion the model of the rate and its parameters are chosen from the data (vgyro.fusion.smoother), once for all rows.
 In a recording that is at rest as a whole the process noise would become zero and the virtual gyro deaf: there the
@@ -28,6 +28,8 @@ from vgyro.fusion.smoother import Smoothed, fixed_bandwidth, mean_variance, smoo
 
 MEAN_HALF_POWER = 0.443
 """-3 dB bandwidth of a mean over T, times T: sin(πx)/(πx) = 1/√2."""
+BELOW_POLE = 0.5
+"""A low-pass is undone on what passes below this part of its frequency, where that costs less than 1 dB of noise."""
 REST_NOTE = "at rest as a whole: a fixed bandwidth, forward and back"
 
 
@@ -134,6 +136,9 @@ def smoothed(array: ArrayRates, parameters: FilterParameters, signal: Signal) ->
         sd = np.sqrt(variance + slow, dtype=np.float32)
     notes = [result.parameters, REST_NOTE if not parameters.in_motion else "", signal.note]
     rate, lead_s = result.rate, signal.late_s if parameters.in_motion else 0.0
+    if lead_s and not result.bandwidth_hz < BELOW_POLE / (2.0 * math.pi * abs(lead_s)):
+        notes.insert(1, f"the smoother passes more than {BELOW_POLE} of the low-pass: its delay stays")
+        lead_s = 0.0
     if lead_s:
         rate = without_pole(array, rate, lead_s)
     seconds = max(part.stop - part.start for part in array.stretches()) * array.period

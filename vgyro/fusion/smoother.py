@@ -1,8 +1,8 @@
-"""The maximum-likelihood smoother: the rate given all samples of a gap-free stretch, by a model of how it moves.
+"""The smoother: the rate given all samples of a gap-free stretch, by a model of how it moves.
 
 The measurement is one series z = w + v whose noise v has its own variance at each sample. What the sensor's pole does
 to the noise is in the model (AR(1)): the rate is smoothed as the sensor passes it, and no colour is taken for motion.
-Rauch, Tung & Striebel (1965), AIAA J. 3(8), 1445-1450; models by likelihood as in Harvey (1989), ch. 3-4.
+Rauch, Tung & Striebel (1965), AIAA J. 3(8), 1445-1450.
 """
 
 from __future__ import annotations
