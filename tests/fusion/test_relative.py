@@ -160,7 +160,7 @@ def test_delays_that_follow_the_colours() -> None:
 
 @pytest.mark.parametrize(("error_ms", "undone"), [(1.1, True), (1.3, False)])
 def test_delays_follow_the_colours_only_if_they_are_sure(error_ms: float, undone: bool) -> None:
-    """Without one of the two late gyros, χ² of four at 3.979 ms and one at 7.958 is .8·(3.979 ms/error)²: 9 at 1.186."""
+    """Without one of the late gyros, χ² of four at 3.979 ms and one at 7.958 is .8·(3.979 ms/error)²: 9 at 1.186."""
     late, _ = array_delay(of_delays(MIXED, error_ms / 1000.0), colours(MIXED), 0.005, UNKNOWN)
     assert (late > 0.0) == undone
 

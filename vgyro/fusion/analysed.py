@@ -134,6 +134,8 @@ def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
     white = blocks.mean_of(variances.start, lasting)
     white[blocks.mean_of(variances.start, variances.excluded.astype(float)) > 0] = np.inf
     slow = slow_errors(array, parameters, white, variances.correlation, blocks)
+    if not parameters.has("slow"):
+        slow = replace(slow, bias=np.zeros_like(slow.bias))
     late, of_delay = _late(array, parameters, ready.relative, variances.phi)
     left_out = f"{len(array.faults)} faults left out" if array.faults else ""
     notes = [*ready.notes, variances.note, score.note, slow.note, of_delay, left_out]

@@ -148,9 +148,9 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
         constant, outlier, correlation, quiet = _in_quiet(array, moments, constant, outlier, correlation)
     variance = np.broadcast_to(constant, moments.excluded.shape)
     memories = [CONSTANT] * gyros
-    moving = None
+    moving, changing = None, changing and parameters.has("changing")
     if changing:
-        found = _changing(array, moments, constant, outlier, correlation, parameters.engine)
+        found = _changing(array, moments, constant, outlier, correlation, parameters)
         variance, memories, correlation, moving = found.variance, found.memories, found.correlation, found.moving
     tau = np.array([memory.tau_s for memory in memories])
     changes = np.array([len(memory.points) for memory in memories])
@@ -163,14 +163,15 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
 
 def _changing(
     array: ArrayRates, moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray,
-    engine: str,
+    parameters: FilterParameters,
 ) -> Resting:  # fmt: skip
     """Variances that change, and the correlation, if that changes as well."""
+    engine, together = parameters.engine, parameters.has("changing_correlation")
     block_s = float(np.median(moments.size)) / array.rate_hz
     if array.at_rest.all():
-        return resting_noise(block_moments(array, own=True), constant, correlation, block_s, engine)
+        return resting_noise(block_moments(array, own=True), constant, correlation, block_s, engine, together)
     found = changing_variances(moments, constant, outlier, correlation, block_s, engine)
-    both = moving_noise(moments, constant, correlation, block_s, found, engine)
+    both = moving_noise(moments, constant, correlation, block_s, found, engine) if together else None
     if both is None:
         rivals = compared(moments, constant, correlation, found)
         if rivals is not None and rivals.still <= rivals.changing:

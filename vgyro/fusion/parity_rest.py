@@ -48,12 +48,18 @@ class Resting:
 
 
 def resting_noise(
-    moments: BlockMoments, constant: np.ndarray, correlation: np.ndarray, block_s: float, engine: str = "native"
+    moments: BlockMoments,
+    constant: np.ndarray,
+    correlation: np.ndarray,
+    block_s: float,
+    engine: str = "native",
+    together: bool = True,
 ) -> Resting:
     """Follow variances and correlation of an array at rest.
 
     moments : of the rates themselves, less one number a gyro (block_moments, own=True)
     constant [N] : (deg/s)², of a gyro of which no block is known;  correlation [N, N] : the constant one
+    together : whether the correlation may change
     Time constants and change points are those that predict each block best from the others (see parity_memory); that
     of the correlation by the Gaussian deviance Σ ν·(log|C| + tr C⁻¹Z) of the standardised second moments Z. Beside the
     constant correlation it pays 2·log(Σν), and a mean of this recording log(Σν) for each pair.
@@ -83,7 +89,8 @@ def resting_noise(
     count = moments.size * share
     correlation = _constant(standard, count, both, correlation)
     np.copyto(standard, correlation, where=~both)
-    return Resting(variance, memories, correlation, _moving(standard, count, correlation, block_s, low_pass))
+    moving = _moving(standard, count, correlation, block_s, low_pass) if together else None
+    return Resting(variance, memories, correlation, moving)
 
 
 def _less_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:

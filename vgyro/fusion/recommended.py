@@ -32,7 +32,9 @@ from vgyro.fusion.weights import min_variance_weights
 def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """All of it, smoothed, with the posterior standard deviation of each sample."""
     known = analysed(array, parameters)
-    variances, note = in_band(known.array, known.variances, passed_hz(array, parameters, known))
+    variances, note = known.variances, ""
+    if parameters.has("band"):
+        variances, note = in_band(known.array, variances, passed_hz(array, parameters, known))
     weights = known.weights if not note else variances.sample_weights(parameters.engine)
     shares = variances.weights(parameters.engine)
     signal = Signal(

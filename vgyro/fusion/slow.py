@@ -103,6 +103,8 @@ def slow_errors(
     centre = 0.0 if degrees is None else float(np.average(degrees, weights=blocks.length))
     relative = None if degrees is None else degrees - centre
     evidence = Evidence.of(array, blocks, variance, noise, resting, relative)
+    if walk is None and not parameters.has("slow_walk"):
+        walk = Walk(np.nan_to_num(array.noise.rrw))
     choice = choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk)
     constants = empirical_prior(evidence, choice.filtered).posterior(choice.filtered)
     state, covariance = run_smoother(choice.information, choice.filtered)
@@ -151,7 +153,7 @@ def _anchors(array: ArrayRates, parameters: FilterParameters, blocks: SlowBlocks
         return none, "no standstill declared: a bias that all gyros share is not seen"
     if array.at_rest.all():
         return none, AS_A_WHOLE
-    if parameters.anchors == "off":
+    if parameters.anchors == "off" or not parameters.has("anchors"):
         return none, "anchors are off: a bias that all gyros share is not seen"
     resting = blocks.all(array.at_rest)
     seconds = float(blocks.length[resting].sum()) * array.period
@@ -164,7 +166,7 @@ def _temperature(array: ArrayRates, parameters: FilterParameters, blocks: SlowBl
     """Temperature of the blocks [B], °C, where it can be regressed on; else None and why."""
     if array.temperature is None:
         return None, ""
-    if parameters.temperature == "off":
+    if parameters.temperature == "off" or not parameters.has("temperature"):
         return None, "temperature is off"
     degrees = blocks.mean(array.temperature)
     known = np.isfinite(degrees)
