@@ -227,12 +227,18 @@ def measured(
 
 
 def ratio(columns: Iterable[Column], row: str, to: str = AVERAGE) -> tuple[float, float, float]:
-    """Error of a row over that of another, geometric mean over the cases of all columns, and its 95 % interval."""
+    """Error of a row over that of another, geometric mean over the cases of all columns, and its 95 % interval.
+
+    NaN where it did not run in every case.
+    """
     from scipy.stats import t as student
 
-    pairs = [pair for one in columns for pair in zip(one.cases.get(row, []), one.cases.get(to, []), strict=False)]
-    if not pairs or min(min(pair) for pair in pairs) <= 0.0:
-        return math.nan, math.nan, math.nan
+    pairs: list[tuple[float, float]] = []
+    for one in columns:
+        mine, theirs = one.cases.get(row, []), one.cases[to]
+        if len(mine) != len(theirs) or min(*mine, *theirs) <= 0.0:
+            return math.nan, math.nan, math.nan
+        pairs += zip(mine, theirs, strict=True)
     logs = np.array([0.5 * math.log(mine / theirs) for mine, theirs in pairs])
     half = math.nan
     if len(logs) > 1:
@@ -263,7 +269,7 @@ def tables(columns: dict[tuple[str, str], Column]) -> str:
     lines += ["", *_header("error over that of the average", kinds)]
     for row in rows:
         found = [ratio([one for (of, _), one in columns.items() if of == kind], row) for kind in kinds]
-        lines.append(_line(row, [f"{one:.3g} [{low:.3g}, {high:.3g}]" for one, low, high in found]))
+        lines.append(_line(row, ["–" if math.isnan(one[0]) else "{:.3g} [{:.3g}, {:.3g}]".format(*one) for one in found]))
     lines += ["", *_header("ours over the best other row", ["all rows", "rows of full bandwidth"])]
     for (kind, axis), one in columns.items():
         cells = []
