@@ -269,7 +269,7 @@ def tables(columns: dict[tuple[str, str], Column]) -> str:
     lines += ["", *_header("error over that of the average", kinds)]
     for row in rows:
         found = [ratio([one for (of, _), one in columns.items() if of == kind], row) for kind in kinds]
-        lines.append(_line(row, ["–" if math.isnan(one[0]) else "{:.3g} [{:.3g}, {:.3g}]".format(*one) for one in found]))
+        lines.append(_line(row, [_interval(*one) for one in found]))
     lines += ["", *_header("ours over the best other row", ["all rows", "rows of full bandwidth"])]
     for (kind, axis), one in columns.items():
         cells = []
@@ -283,6 +283,12 @@ def tables(columns: dict[tuple[str, str], Column]) -> str:
 
 def _header(corner: str, names: Sequence[str]) -> list[str]:
     return [_line(corner, names), "|" + " --- |" * (len(names) + 1)]
+
+
+def _interval(value: float, low: float, high: float) -> str:
+    if math.isnan(value):
+        return "–"
+    return f"{value:.3g}" if math.isnan(low) else f"{value:.3g} [{low:.3g}, {high:.3g}]"
 
 
 def _line(row: str, cells: Sequence[str]) -> str:
