@@ -16,6 +16,7 @@ PARTS: dict[str, str] = {
     "dcc": "variances of DCC where it forecasts better",
     "slow": "slow errors of the gyros, from their differences",
     "slow_walk": "random walks by likelihood instead of those of the noise record",
+    "slow_common": "what all gyros drift together at rest goes into the deviation",
     "temperature": "slow errors that follow the temperature",
     "anchors": "standstill pins the common bias",
     "band": "variances of the band that passes",

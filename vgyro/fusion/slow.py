@@ -16,6 +16,7 @@ from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_choice import Choice, choose
+from vgyro.fusion.slow_common import common_note, common_walk
 from vgyro.fusion.slow_model import Constants, Evidence, Walk, with_shared_slope
 from vgyro.fusion.slow_prior import empirical_prior
 from vgyro.fusion.slow_smoother import run_smoother
@@ -102,7 +103,8 @@ def slow_errors(
     degrees, why_not = _temperature(array, parameters, blocks)
     centre = 0.0 if degrees is None else float(np.average(degrees, weights=blocks.length))
     relative = None if degrees is None else degrees - centre
-    evidence = Evidence.of(array, blocks, variance, noise, resting, relative)
+    common = common_walk(array.noise.scales) if parameters.has("slow_common") else 0.0
+    evidence = Evidence.of(array, blocks, variance, noise, resting, relative, common)
     if walk is None and not parameters.has("slow_walk"):
         walk = Walk(np.nan_to_num(array.noise.rrw))
     choice = choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk)
@@ -114,6 +116,9 @@ def slow_errors(
         so_far, _ = _with_constants(state, covariance, constants, design)
         constants = with_shared_slope(evidence, choice.walk, so_far, constants)
     bias, covariance = _with_constants(state, covariance, constants, design)
+    if common and not evidence.anchored:
+        # Seen in nothing, so that it grows from the start on, whether or not the gyros' own walks fade.
+        covariance += (common * (blocks.time - blocks.time[0]))[:, None, None]
     slopes = slice(evidence.plain, None)
     warming = (
         Temperature(constants.mean[slopes], constants.covariance[slopes, slopes], centre) if choice.slopes else None
@@ -122,6 +127,7 @@ def slow_errors(
         why,
         why_not,
         _of_walk(array, choice.walk),
+        common_note(common),
         _of_temperature(choice, evidence.anchored, constant_rate),
     )
     note = "; ".join(filter(None, parts))

@@ -50,7 +50,7 @@ class Evidence:
     weight : G [B, N, N];  total : R⁻¹1 [B, N];  time : [B] s
     design : D [B, N, k] of the constants: the N biases, E steps after faults, and the N temperature slopes if any
     steps  : variances beforehand of the steps, (deg/s)²
-    walks  : correlation [N, N] of the random walks
+    walks  : correlation [N, N] of the random walks;  common : variance of a walk that all share, (deg/s)²/s
     anchored : standstill makes the common part seen in some of the blocks
     """
 
@@ -63,6 +63,7 @@ class Evidence:
     steps: np.ndarray
     walks: np.ndarray
     anchored: bool
+    common: float = 0.0
 
     @classmethod
     def of(
@@ -73,12 +74,13 @@ class Evidence:
         correlation: np.ndarray,
         resting: np.ndarray,
         temperature: np.ndarray | None,
+        common: float = 0.0,
     ) -> Evidence:
         """All blocks of a recording.
 
         variance    : [B, N], (deg/s)² of a sample; not finite or not above 0: the gyro says nothing in this block
         correlation : [N, N] of the noise;  resting : [B] of bool, the board stands still for certain
-        temperature : [B], K, about its mean; None: no slopes
+        temperature : [B], K, about its mean; None: no slopes;  common : variance of a walk that all share
         """
         used = np.isfinite(variance) & (variance > 0) & ~blocks.at_fault(array)
         weight = _inverse_covariance(used, variance / blocks.length[:, None], correlation)
@@ -103,6 +105,7 @@ class Evidence:
             sizes,
             array.noise.correlation,
             bool(resting.any()),
+            common,
         )
 
     @property
@@ -146,10 +149,11 @@ class Evidence:
     def filtered_with(self, information: Information, walks: Sequence[Walk]) -> list[Filtered]:
         """The filter's forward pass with each of several walks.
 
+        Without anchors nothing is seen of what all share, and the walk that they share is left out.
         What rounding takes for information on the constants, or against it, is taken out: without anchors their common
         parts are not seen at all, nor is a gyro that no block uses, and nowhere is there less than none.
         """
-        steps = np.stack([np.outer(one.rrw, one.rrw) * self.walks for one in walks])
+        steps = np.stack([np.outer(one.rrw, one.rrw) * self.walks + self.anchored * self.common for one in walks])
         taus = np.array([one.tau_s for one in walks])
         return [self._cleared(filtered) for filtered in run_filters(information, steps, taus)]
 
@@ -268,7 +272,7 @@ def with_shared_slope(evidence: Evidence, walk: Walk, bias: np.ndarray, constant
     gap = np.diff(evidence.time, prepend=evidence.time[:1])
     left = Information(D[:, None, None], vector, np.tensordot(columns, vector, axes=([0, 1], [0, 1])), gap)
     mean = u.mean(axis=0)
-    walks = (mean * walk.rrw) @ evidence.walks @ (mean * walk.rrw)
+    walks = (mean * walk.rrw) @ evidence.walks @ (mean * walk.rrw) + evidence.common * float(mean.sum()) ** 2
     squares = run_filters(left, np.array([[[walks]]]), np.array([walk.tau_s]))[0].squares
     # The constant is not known at all.
     seen = squares[2, 2] - squares[1, 2] ** 2 / squares[1, 1]
