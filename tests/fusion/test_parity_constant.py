@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from scipy.linalg import helmert
 from scipy.optimize import minimize
-from scipy.stats import multivariate_normal
 
 from vgyro.fusion import ArrayNoise, ArrayRates, CannotRun, FilterParameters
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.parity import cornered_hat, pair_variances, parity_variances
 from vgyro.fusion.parity_blocks import SLOW_BLOCKS, BlockMoments, block_moments
-from vgyro.fusion.parity_hat import best_weights, constant_variances, outliers, parity_deviance
+from vgyro.fusion.parity_hat import best_weights, constant_variances, outliers
 
 MOVING = FilterParameters(in_motion=True)
 RATES = [(12000, 200.0), (3600, 1.0)]
@@ -235,27 +234,6 @@ def test_faulty_stretches_do_not_count():
     np.testing.assert_array_equal(found.excluded[:, 2], inside)
     assert (found.weights()[inside, 2] == 0).all()
     assert not found.excluded[:, [0, 1, 3]].any()
-
-
-def test_deviance_of_the_differences_dense():
-    # Expected: the Gaussian density of the Helmert contrasts, by scipy; a common rate changes nothing.
-    rng = np.random.default_rng(8)
-    correlation = np.full((4, 4), 0.2) + 0.8 * np.eye(4)
-    variance, y = rng.uniform(0.3, 3.0, (6, 4)), rng.standard_normal((6, 4))
-    excluded = np.zeros((6, 4), dtype=bool)
-    excluded[3, 1] = True
-    found = parity_deviance(y + 70.0, variance, excluded, correlation)
-
-    def density(block):
-        kept = np.flatnonzero(~excluded[block])
-        sigma, contrast = np.sqrt(variance[block, kept]), helmert(len(kept))
-        S = contrast @ (np.outer(sigma, sigma) * correlation[np.ix_(kept, kept)]) @ contrast.T
-        constant = (len(kept) - 1) * np.log(2 * np.pi)
-        # The contrasts are orthonormal, 1 has the length √N, and |C| is left out.
-        left_out = np.log(len(kept)) - np.linalg.slogdet(correlation[np.ix_(kept, kept)])[1]
-        return -2 * multivariate_normal(cov=S).logpdf(contrast @ y[block, kept]) - constant + left_out
-
-    np.testing.assert_allclose(found, [density(block) for block in range(6)], rtol=1e-8)
 
 
 def test_pairs_of_second_moments():

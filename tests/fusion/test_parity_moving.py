@@ -5,13 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import helmert
 from scipy.signal import lfilter
+from scipy.stats import multivariate_normal
 
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
 from vgyro.fusion.parity import parity_variances
 from vgyro.fusion.parity_blocks import block_moments
 from vgyro.fusion.parity_changing import changing_variances
-from vgyro.fusion.parity_hat import constant_variances, parity_deviance
+from vgyro.fusion.parity_hat import constant_variances
 from vgyro.fusion.parity_moving import Score, moving_noise, squares_of_pairs
 
 MOVING = FilterParameters(in_motion=True)
@@ -143,7 +145,7 @@ def test_a_gyro_at_fault_has_no_say():
 
 
 def test_score_is_the_likelihood_of_the_differences():
-    # Expected: that of parity_deviance, which is written with R and not with a basis, summed over the samples.
+    # Expected: the Gaussian density of the Helmert contrasts, by scipy, summed over the samples.
     array, _ = simulated(4, variances=0.5)
     moments = block_moments(
         replace(array, rate=array.rate[:1000], segment=array.segment[:1000], at_rest=array.at_rest[:1000]), 1
@@ -157,5 +159,14 @@ def test_score_is_the_likelihood_of_the_differences():
     rng = np.random.default_rng(1)
     C = np.full((GYROS, GYROS), 0.3) + 0.7 * np.eye(GYROS)
     one, other = rng.uniform(0.5, 2.0, (2, 1000, GYROS))
-    expected = [parity_deviance(array.rate[:1000], v, moments.excluded, C).sum() for v in (one, other)]
+
+    def deviance(variance):
+        total = 0.0
+        for row, kept in enumerate(np.logical_not(moments.excluded)):
+            sigma, contrast = np.sqrt(variance[row, kept]), helmert(int(kept.sum()))
+            S = contrast @ (np.outer(sigma, sigma) * C[np.ix_(kept, kept)]) @ contrast.T
+            total -= 2.0 * multivariate_normal(cov=S).logpdf(contrast @ array.rate[row, kept])
+        return total
+
+    expected = [deviance(one), deviance(other)]
     assert score(one, C) - score(other, C) == pytest.approx(expected[0] - expected[1], rel=1e-6)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from vgyro.fusion import METHODS, FilterParameters, SampleWeights
 from vgyro.fusion import smoothed as smoothed_rows
-from vgyro.fusion.analysed import DCC, analysed, shared_motion
+from vgyro.fusion.analysed import analysed, shared_motion
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.lowpass import pole_times
 from vgyro.fusion.motion_models import Motion
@@ -229,19 +228,3 @@ def test_constant_and_changing_variances_are_kept_apart(make_array):
     constant, changing = (shared_variances(array, STILL, one) for one in (False, True))
     assert np.ptp(constant.variance[:, 0]) == 0
     assert changing.variance[-1, 0] > 10 * changing.variance[0, 0]
-
-
-def test_where_dcc_is_preferred_its_variances_weigh(make_array, monkeypatch):
-    # Closed form: w ∝ 1/σ² of the deviations given, even where a changing covariance was seen in the rates themselves.
-    samples, seconds = 12_000, 60
-    block = np.repeat(np.arange(seconds, dtype=np.int32), 200)
-    table = np.tile([0.05, 0.1, 0.2], (seconds, 1))
-    array = make_array(samples, [0.1, 0.1, 0.1])
-    array = replace(array, deviations={DCC: SampleWeights.of(table, block)})
-    found = shared_variances(array, STILL, True)
-    seen = replace(found, moving=np.tile(np.eye(3), (len(found.start), 1, 1)))
-    monkeypatch.setattr("vgyro.fusion.analysed.shared_variances", lambda *_: seen)
-    monkeypatch.setattr("vgyro.fusion.analysed.prefer_dcc", lambda *_: SimpleNamespace(prefer=True, note="preferred"))
-    inverse = table[0] ** -2.0
-    weights = every(analysed(array, STILL).weights)
-    np.testing.assert_allclose(weights, np.tile(inverse / inverse.sum(), (samples, 1)), atol=0.03)

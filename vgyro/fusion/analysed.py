@@ -2,8 +2,7 @@
 
 R_t, the white noise of each gyro: constant, changing with a time constant or with change points, gyro by gyro, by
 predictive likelihood of the differences; at rest as a whole, of the rates themselves less their slow part, correlation
-included (vgyro.fusion.parity); or from DCC of the residual where its causal forecasts are better by the
-test of Diebold & Mariano (1995). Slow errors b: vgyro.fusion.slow. The motion: vgyro.fusion.smoother.
+included (vgyro.fusion.parity). Slow errors b: vgyro.fusion.slow. The motion: vgyro.fusion.smoother.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from vgyro.fusion.missing import unseen
 from vgyro.fusion.motion_models import Motion
 from vgyro.fusion.motion_shared import shared_lines
 from vgyro.fusion.parity import Variances, shared_variances
-from vgyro.fusion.parity_dcc import prefer_dcc
 from vgyro.fusion.prepared import prepared
 from vgyro.fusion.quantised import grid, lasting_of_mean, least_variance
 from vgyro.fusion.relative import Relative, relative_variance, smoothed
@@ -27,9 +25,6 @@ from vgyro.fusion.slow import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.smoother import choose_motion
 from vgyro.fusion.unseen import StandIn
-
-DCC = ("dcc", "in_sample", "residual")
-CAUSAL_DCC = ("dcc", "causal", "residual")
 
 
 @dataclass(frozen=True)
@@ -126,9 +121,6 @@ def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
     ready = prepared(raw, parameters)
     array = ready.array
     variances = _not_below(shared_variances(array, parameters, True), ready.step)
-    score = prefer_dcc(array, parameters, variances)
-    if score.prefer and parameters.has("dcc"):
-        variances = _not_below(_of_dcc(array, parameters, variances), ready.step)
     blocks = SlowBlocks.of(array)
     lasting = variances.variance * (1.0 + variances.phi) / (1.0 - variances.phi)
     white = blocks.mean_of(variances.start, lasting)
@@ -138,7 +130,7 @@ def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
         slow = replace(slow, bias=np.zeros_like(slow.bias))
     late, of_delay = _late(array, parameters, ready.relative, variances.phi)
     left_out = f"{len(array.faults)} faults left out" if array.faults else ""
-    notes = [*ready.notes, variances.note, score.note, slow.note, of_delay, left_out]
+    notes = [*ready.notes, variances.note, slow.note, of_delay, left_out]
     weights = variances.sample_weights(parameters.engine)
     note = "; ".join(one for one in notes if one)
     return Analysed(array, variances, weights, slow, note, ready.relative, late, ready.guess)
@@ -159,14 +151,3 @@ def _not_below(variances: Variances, step: np.ndarray) -> Variances:
     if not (variances.variance < least).any():
         return variances
     return replace(variances, variance=np.maximum(variances.variance, least))
-
-
-def _of_dcc(array: ArrayRates, parameters: FilterParameters, variances: Variances) -> Variances:
-    """The same with the variances that GARCH gives, where it gives any: in-sample, or else causal ones."""
-    deviations = array.deviations[DCC if DCC in array.deviations else CAUSAL_DCC]
-    length = max(1, round(array.rate_hz / parameters.block_hz))
-    table = np.concatenate(list(deviations.rows([slice(0, int(deviations.block.max()) + 1)])))
-    block = deviations.block[(variances.start + variances.stop) // 2]
-    variance = length * table[np.maximum(block, 0)] ** 2
-    known = (block >= 0)[:, None] & np.isfinite(variance) & (variance > 0)
-    return replace(variances, variance=np.where(known, variance, variances.variance), moving=None)

@@ -87,15 +87,6 @@ def _settled(
     return square
 
 
-def residual_means(
-    moments: BlockMoments, variance: np.ndarray, used: np.ndarray, correlation: np.ndarray
-) -> np.ndarray:  # fmt: skip
-    """Means [M, N], deg/s, of the residual of each block less its slow part; variance, used [M, N]."""
-    best = best_weights(variance, moments.excluded, correlation)
-    mean = moments.residual(best.weights)[1]
-    return mean - _slow_part(moments, best, variance, used, mean)[0]
-
-
 def _squares(moments: BlockMoments, variance: np.ndarray, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
     """Mean squares [M, N] of the gyros' noise, (deg/s)², without bias where `variance` [M, N] is theirs.
 

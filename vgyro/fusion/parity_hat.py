@@ -80,26 +80,6 @@ def best_weights(variance: np.ndarray, excluded: np.ndarray, correlation: np.nda
     return Best(weights, total)
 
 
-def parity_deviance(
-    residual: np.ndarray, variance: np.ndarray, excluded: np.ndarray, correlation: np.ndarray
-) -> np.ndarray:  # fmt: skip
-    """-2 log likelihood [M] of the differences between the gyros, each block one sample, but for constants.
-
-    log|R| + log(1'R⁻¹1) + e'(R⁻¹ - R⁻¹11'R⁻¹/(1'R⁻¹1))e of the gyros that are not excluded: what is common to the rows
-    of residual e [M, N], deg/s, changes nothing. variance [M, N] (deg/s)²: R = σσ'∘C.
-    """
-    deviance = np.empty(len(residual))
-    sigma = np.sqrt(variance)
-    for pattern, rows in patterns(excluded):
-        kept = np.flatnonzero(~pattern)
-        inverse = np.linalg.inv(correlation[np.ix_(kept, kept)])
-        scaled, ones = (residual / sigma)[np.ix_(rows, kept)], 1.0 / sigma[np.ix_(rows, kept)]
-        mass, cross = np.sum((ones @ inverse) * ones, axis=1), np.sum((ones @ inverse) * scaled, axis=1)
-        square = np.sum((scaled @ inverse) * scaled, axis=1) - cross**2 / mass
-        deviance[rows] = square + np.log(mass) - 2.0 * np.log(ones).sum(axis=1)
-    return deviance
-
-
 def patterns(excluded: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """The different rows of excluded [M, N], and the numbers of the blocks that have each; all of a row: none of it."""
     if not excluded.any():

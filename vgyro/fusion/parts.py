@@ -13,7 +13,6 @@ PARTS: dict[str, str] = {
     "changing": "variances that change with time",
     "segments": "change points of the variances",
     "changing_correlation": "correlations that change with time",
-    "dcc": "variances of DCC where it forecasts better",
     "slow": "slow errors of the gyros, from their differences",
     "slow_walk": "random walks by likelihood instead of those of the noise record",
     "slow_common": "what all gyros drift together at rest goes into the deviation",

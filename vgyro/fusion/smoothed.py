@@ -15,7 +15,7 @@ import numpy as np
 from vgyro import engine as engines
 from vgyro.errors import DataError
 from vgyro.fusion.activity import find_activity
-from vgyro.fusion.analysed import DCC, analysed, shared_motion
+from vgyro.fusion.analysed import analysed, shared_motion
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.conditional import conditional
@@ -30,6 +30,7 @@ MEAN_HALF_POWER = 0.443
 """-3 dB bandwidth of a mean over T, times T: sin(πx)/(πx) = 1/√2."""
 BELOW_POLE = 0.5
 """A low-pass is undone on what passes below this part of its frequency, where that costs less than 1 dB of noise."""
+DCC = ("dcc", "in_sample", "residual")
 REST_NOTE = "at rest as a whole: a fixed bandwidth, forward and back"
 
 
