@@ -14,7 +14,7 @@ from vgyro.fusion.parity import parity_variances
 from vgyro.fusion.parity_blocks import block_moments
 from vgyro.fusion.parity_changing import changing_variances
 from vgyro.fusion.parity_hat import constant_variances
-from vgyro.fusion.parity_moving import Score, moving_noise, squares_of_pairs
+from vgyro.fusion.parity_moving import Score, alike, moving_noise, squares_of_pairs
 
 MOVING = FilterParameters(in_motion=True)
 RATE_HZ, SECONDS, GYROS = 100.0, 1200, 6
@@ -170,3 +170,21 @@ def test_score_is_the_likelihood_of_the_differences():
 
     expected = [deviance(one), deviance(other)]
     assert score(one, C) - score(other, C) == pytest.approx(expected[0] - expected[1], rel=1e-6)
+
+
+@pytest.mark.parametrize(("times", "even"), [(1.0, True), (1.06, True), (1.3, False)])
+def test_gyros_are_alike_unless_the_differences_show_it(times, even):
+    """One of six gyros has `times` the variance: 5·log Σν is asked for, the deviance gives some Σν·(times - 1)²/3."""
+    array, _ = simulated(12, variances=0.0)
+    rate = np.random.default_rng(3).standard_normal((12_000, GYROS)) * 0.1
+    rate[:, 2] *= np.sqrt(times)
+    rows = slice(0, 12_000)
+    array = replace(array, rate=np.asfortranarray(rate), segment=array.segment[rows], at_rest=array.at_rest[rows])
+    moments = block_moments(array)
+    constant, outlier = constant_variances(moments, np.eye(GYROS))
+    assert alike(moments, constant, outlier, np.eye(GYROS)) == even
+    found = parity_variances(array, MOVING, changing=False)
+    assert (np.ptp(found.variance) == 0.0) == even
+    assert ("equal variances" in found.note) == even
+    without = parity_variances(array, replace(MOVING, without=frozenset({"guard"})), changing=False)
+    assert np.ptp(without.variance) > 0.0

@@ -22,7 +22,7 @@ from vgyro.fusion.parity_hat import best_weights, constant_variances, patterns, 
 from vgyro.fusion.parity_hat import cornered_hat as cornered_hat
 from vgyro.fusion.parity_hat import pair_variances as pair_variances
 from vgyro.fusion.parity_memory import CONSTANT
-from vgyro.fusion.parity_moving import compared, moving_noise
+from vgyro.fusion.parity_moving import alike, compared, moving_noise
 from vgyro.fusion.parity_quiet import against, good_blocks, quiet_noise
 from vgyro.fusion.parity_rest import Resting, resting_noise
 from vgyro.fusion.weights import min_variance_weights
@@ -146,6 +146,9 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     quiet = False
     if parameters.has("quiet") and not array.at_rest.all():
         constant, outlier, correlation, quiet = _in_quiet(array, moments, constant, outlier, correlation)
+    even = parameters.has("guard") and not quiet and alike(moments, constant, outlier, correlation)
+    if even:
+        constant = np.full(gyros, float(constant[~moments.excluded.all(axis=0)].mean()))
     variance = np.broadcast_to(constant, moments.excluded.shape)
     memories = [CONSTANT] * gyros
     moving, changing = None, changing and parameters.has("changing")
@@ -156,6 +159,8 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     changes = np.array([len(memory.points) for memory in memories])
     phi = colour(array, moments, constant)
     note = _note(moments, correlation, gyros, changing and bool(array.at_rest.all()), moving, quiet)
+    if even and not np.ptp(variance, axis=1).any():
+        note += "; no gyro is shown to be better than another: equal variances"
     return Variances(
         moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note, moving
     )  # fmt: skip

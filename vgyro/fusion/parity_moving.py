@@ -141,6 +141,22 @@ class Rivals:
     changing: float
 
 
+def alike(moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray) -> bool:
+    """Does nothing show that a gyro is better than another? Then equal weights, the average, are as good as any.
+
+    Constant [N] variances against their mean for all: by the deviance of the differences, they must be worth
+    (N - 1)·log Σν. correlation [N, N] of the noise;  outlier [M, N]
+    """
+    freedom = moments.size.astype(float)
+    score = Score(moments, squares_of_pairs(moments, ~moments.excluded & ~outlier), outlier, freedom)
+    if len(score.rows) == 0:
+        return False
+    blocks = np.ones((len(score.rows), 1))
+    used = ~moments.excluded.all(axis=0)
+    same = score(blocks * np.where(used, constant[used].mean(), constant), correlation)
+    return bool(same - score(blocks * constant, correlation) < (int(used.sum()) - 1) * score.price)
+
+
 def compared(
     moments: BlockMoments, constant: np.ndarray, correlation: np.ndarray, changing: Changing
 ) -> Rivals | None:  # fmt: skip

@@ -21,5 +21,5 @@ PARTS: dict[str, str] = {
     "band": "variances of the band that passes",
     "lines": "vibrations are motion",
     "activity": "motion that comes and goes",
-    "guard": "the average, where the recording itself shows it to be better",
+    "guard": "equal variances, where the differences do not show that one gyro is better than another",
 }
