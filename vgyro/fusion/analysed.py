@@ -1,6 +1,6 @@
 """What an array's own differences say of a recording, estimated once for all methods that need it.
 
-R_t, the white noise of each gyro: constant, changing with a time constant or with change points, gyro by gyro, by
+R_t, the white noise of each gyro: constant, changing with a time constant, gyro by gyro, by
 predictive likelihood of the differences; at rest as a whole, of the rates themselves less their slow part, correlation
 included (vgyro.fusion.parity). Slow errors b: vgyro.fusion.slow. The motion: vgyro.fusion.smoother.
 """

@@ -42,8 +42,7 @@ class Variances:
     start, stop [M] int64 : samples of each block; in order, every sample is in one, none reaches over a gap
     variance [M, N]  : (deg/s)² a sample, with its colour; above zero, also where the gyro is excluded
     excluded [M, N]  : at fault, or stuck
-    tau_s [N]        : time constant of the two-sided EWMA, s; infinite: constant, but for the change points
-    changes [N]      : number of change points
+    tau_s [N]        : time constant of the two-sided EWMA, s; infinite: constant
     correlation [N, N] : of the noise, the same all the time, or about the mean of
     moving [M, N, N] : that of each block; None: the same all the time
     phi [N]          : correlation of a gyro's noise from one sample to the next; 0 where it is not significant
@@ -55,7 +54,6 @@ class Variances:
     variance: np.ndarray
     excluded: np.ndarray
     tau_s: np.ndarray
-    changes: np.ndarray
     correlation: np.ndarray
     phi: np.ndarray
     note: str = ""
@@ -126,10 +124,10 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     """Variances of the gyros' noise from the residuals against the array's own estimate, which know no motion.
 
     At rest as a whole those that change are of the rates themselves, and their correlation may change as well.
-    changing : False gives constant variances. Otherwise each is a two-sided EWMA over blocks, or constant between
-               change points, or both; time constant and change points are those that predict each block best from the
-               others, gyro by gyro, and must pay for themselves, so that white noise keeps a constant variance. Where
-               the differences are predicted better if the correlation changes as well, it does (parity_moving)
+    changing : False gives constant variances. Otherwise each is a two-sided EWMA over blocks whose time constant
+               predicts each block best from the others, gyro by gyro, and must pay for itself, so that white noise
+               keeps a constant variance. Where the differences are predicted better if the correlation changes as
+               well, it does (parity_moving)
     returns  : Variances; faults of the array and stuck gyros are left out
     raises   : CannotRun for one gyro, or fewer than 16 blocks (of 0.25 s; of a sample below 8 Hz) without fault
     Two gyros cannot be told apart by parity: each has half the variance of their difference.
@@ -156,13 +154,12 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
         found = _changing(array, moments, constant, outlier, correlation, parameters)
         variance, memories, correlation, moving = found.variance, found.memories, found.correlation, found.moving
     tau = np.array([memory.tau_s for memory in memories])
-    changes = np.array([len(memory.points) for memory in memories])
     phi = colour(array, moments, constant)
     note = _note(moments, correlation, gyros, changing and bool(array.at_rest.all()), moving, quiet)
     if even and not np.ptp(variance, axis=1).any():
         note += "; no gyro is shown to be better than another: equal variances"
     return Variances(
-        moments.start, moments.stop, variance, moments.excluded, tau, changes, correlation, phi, note, moving
+        moments.start, moments.stop, variance, moments.excluded, tau, correlation, phi, note, moving
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""How fast a variance changes: time constants, change points, and which of them predicts best."""
+"""How fast a variance changes: time constants, and which of them predicts best."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from vgyro.fusion.parity_segments import change_points, segment_sums
 
 TIME_CONSTANTS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0)
 FEWEST_BLOCKS = 2.0
@@ -23,12 +21,10 @@ LowPass = Callable[[np.ndarray, float, float, float], np.ndarray]
 class Memory:
     """What a variance is an average over.
 
-    points : [C] change points, within whose segments the average is taken, or relative to whose means
     keep   : share of a block that is left one block further; 1: every block counts the same
-    tau_s  : the same as a time constant; infinite: constant but for the change points
+    tau_s  : the same as a time constant; infinite: constant
     """
 
-    points: np.ndarray
     keep: float
     tau_s: float
 
@@ -39,19 +35,14 @@ class Memory:
         """
         total = freedom * square
         level = total.sum() / max(freedom.sum(), LEAST_MASS)
-        if len(self.points) or self.keep == 1.0:
-            number, mass = segment_sums(self.points, freedom), segment_sums(self.points, total)
-            base, alone = _ratio(mass, number, level), _ratio(mass - total, number - freedom, level)
-            if self.keep == 1.0:
-                return base, alone
-            relative = Memory(np.empty(0, dtype=np.int64), self.keep, self.tau_s)
-            with_it, without = relative.average(square / base, freedom, low_pass)
-            return base * with_it, alone * without
-        around, near = both_sides(total, self.keep, low_pass), both_sides(freedom, self.keep, low_pass)
+        if self.keep == 1.0:
+            around, near = np.full(len(total), total.sum()), np.full(len(total), freedom.sum())
+        else:
+            around, near = both_sides(total, self.keep, low_pass), both_sides(freedom, self.keep, low_pass)
         return _ratio(around, near, level), _ratio(around - total, near - freedom, level)
 
 
-CONSTANT = Memory(np.empty(0, dtype=np.int64), 1.0, math.inf)
+CONSTANT = Memory(1.0, math.inf)
 
 
 def both_sides(values: np.ndarray, keep: float, low_pass: LowPass) -> np.ndarray:
@@ -70,28 +61,21 @@ def chosen_memory(square: np.ndarray, freedom: np.ndarray, block_s: float, low_p
 
     square [M] : of expectation σ²;  freedom [M] : samples of each block; 0: left out;  block_s : s from block to block
     Score: the Gaussian deviance Σ ν·(x/v + log v) with v from the other blocks alone (QLIKE, Patton 2011, J.
-    Econometrics 160, 246-256). Beside a constant variance, anything pays 2·log(Σν) for its time constant, and log M for
-    each change point, whose place the block itself had a say in.
+    Econometrics 160, 246-256). Beside a constant variance, anything pays 2·log(Σν) for its time constant.
     """
-    none = np.empty(0, dtype=np.int64)
     if not freedom.any() or not square[freedom > 0].any():
-        return Memory(none, 1.0, math.inf)
+        return CONSTANT
     scaled = freedom * effective_share(square, freedom)
-    points = change_points(square, scaled)
-    bases = [none, points] if len(points) else [none]
-    best, least = Memory(none, 1.0, math.inf), math.inf
-    for base in bases:
-        for tau in (math.inf, *TIME_CONSTANTS_S):
-            if tau < FEWEST_BLOCKS * block_s:
-                continue
-            memory = Memory(base, math.exp(-block_s / tau), tau)
-            alone = memory.average(square, scaled, low_pass)[1]
-            price = (2.0 * math.log(max(scaled.sum(), 2.0)) if tau < math.inf else 0.0) + len(base) * math.log(
-                len(square)
-            )
-            score = float(np.sum(scaled * (square / alone + np.log(alone)))) + price
-            if score < least:
-                best, least = memory, score
+    best, least = CONSTANT, math.inf
+    for tau in (math.inf, *TIME_CONSTANTS_S):
+        if tau < FEWEST_BLOCKS * block_s:
+            continue
+        memory = Memory(math.exp(-block_s / tau), tau)
+        alone = memory.average(square, scaled, low_pass)[1]
+        price = 2.0 * math.log(max(scaled.sum(), 2.0)) if tau < math.inf else 0.0
+        score = float(np.sum(scaled * (square / alone + np.log(alone)))) + price
+        if score < least:
+            best, least = memory, score
     return best
 
 

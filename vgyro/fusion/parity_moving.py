@@ -173,7 +173,7 @@ def compared(
     if len(score.rows) == 0:
         return None
     still = np.broadcast_to(constant, changing.alone[score.rows].shape)
-    price = _price(changing.memories, score, len(moments.size))
+    price = _price(changing.memories, score)
     return Rivals(
         score, square, score(still, correlation), score(changing.alone[score.rows], correlation) + price
     )  # fmt: skip
@@ -221,9 +221,9 @@ def moving_noise(
     return replace(chosen, variance=np.maximum(chosen.variance, shown))
 
 
-def _price(memories: list[Memory], score: Score, blocks: int) -> float:
+def _price(memories: list[Memory], score: Score) -> float:
     times = sum(math.isfinite(one.tau_s) for one in memories)
-    return 2.0 * times * score.price + sum(len(one.points) for one in memories) * math.log(blocks)
+    return 2.0 * times * score.price
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ def resting_noise(
     moments : of the rates themselves, less one number a gyro (block_moments, own=True)
     constant [N] : (deg/s)², of a gyro of which no block is known;  correlation [N, N] : the constant one
     together : whether the correlation may change
-    Time constants and change points are those that predict each block best from the others (see parity_memory); that
+    Time constants are those that predict each block best from the others (see parity_memory); that
     of the correlation by the Gaussian deviance Σ ν·(log|C| + tr C⁻¹Z) of the standardised second moments Z. Beside the
     constant correlation it pays 2·log(Σν), and a mean of this recording log(Σν) for each pair.
     """

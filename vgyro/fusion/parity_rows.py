@@ -35,9 +35,5 @@ def residual_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
 
 def described(found: Variances) -> str:
     """How fast the variance of each gyro changes, in words."""
-    words = []
-    for tau, changes in zip(found.tau_s.tolist(), found.changes.tolist(), strict=True):
-        parts = [f"τ = {tau:g} s"] if np.isfinite(tau) else []
-        parts += [f"{changes} change points"] if changes else []
-        words.append(" and ".join(parts) or "constant")
+    words = [f"τ = {tau:g} s" if np.isfinite(tau) else "constant" for tau in found.tau_s.tolist()]
     return "variances: " + ", ".join(words)

@@ -11,7 +11,6 @@ PARTS: dict[str, str] = {
     "pole": "the sensor's low-pass is undone where it is declared or the motion shows it",
     "quiet": "correlations of the noise from the frequencies at which the motion is small",
     "changing": "variances that change with time",
-    "segments": "change points of the variances",
     "changing_correlation": "correlations that change with time",
     "slow": "slow errors of the gyros, from their differences",
     "slow_walk": "random walks by likelihood instead of those of the noise record",
