@@ -15,6 +15,7 @@ import numpy as np
 
 from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters
 from vgyro.fusion.blocks import PIECE, SampleWeights
+from vgyro.fusion.motion_noise import motion_noise
 from vgyro.fusion.parity_blocks import BlockMoments, block_moments
 from vgyro.fusion.parity_changing import changing_variances
 from vgyro.fusion.parity_colour import colour
@@ -47,6 +48,7 @@ class Variances:
     moving [M, N, N] : that of each block; None: the same all the time
     phi [N]          : correlation of a gyro's noise from one sample to the next; 0 where it is not significant
     note             : what to know before using it
+    added [M]        : what motion adds to each gyro's variance, correlated with nothing; None: nothing
     """
 
     start: np.ndarray
@@ -58,6 +60,7 @@ class Variances:
     phi: np.ndarray
     note: str = ""
     moving: np.ndarray | None = None
+    added: np.ndarray | None = None
 
     @property
     def gyros(self) -> int:
@@ -79,8 +82,35 @@ class Variances:
             weights = best_weights(self.variance, self.excluded, self.correlation).weights
         else:
             weights = self._bounded(self.moving, engine)
+        if self.added is not None and not np.array_equal(self.correlation, np.eye(self.gyros)):
+            self._beside_motion(weights)
         weights[self.excluded.all(axis=1)] = 1.0 / self.gyros
         return weights
+
+    def _beside_motion(self, weights: np.ndarray) -> None:
+        """Weights [M, N] of R = σσ'∘C + qI where motion adds q to each variance, in place."""
+        assert self.added is not None
+        for pattern, rows in patterns(self.excluded):
+            rows, kept = rows[self.added[rows] > 0], np.flatnonzero(~pattern)
+            for begin in range(0, len(rows), PIECE):
+                piece = rows[begin : begin + PIECE]
+                share = np.linalg.solve(self.covariance(piece)[:, kept[:, None], kept], np.ones((len(kept), 1)))[
+                    :, :, 0
+                ]
+                weights[piece] = 0.0
+                weights[np.ix_(piece, kept)] = share / share.sum(axis=1, keepdims=True)
+
+    def covariance(self, rows: np.ndarray) -> np.ndarray:
+        """R [B, N, N], (deg/s)², of some blocks, by their numbers, with the constant correlation."""
+        added = np.zeros(len(rows)) if self.added is None else self.added[rows]
+        sigma = np.sqrt(np.maximum(self.variance[rows] - added[:, None], 0.0))
+        own = sigma[:, :, None] * sigma[:, None, :] * self.correlation
+        return np.asarray(own + added[:, None, None] * np.eye(self.gyros))
+
+    def scaled(self, factor: np.ndarray) -> Variances:
+        """The same with the gyros' own variances times factor [N]."""
+        added = 0.0 if self.added is None else self.added[:, None]
+        return replace(self, variance=(self.variance - added) * factor + added)
 
     def _bounded(self, moving: np.ndarray, engine: str) -> np.ndarray:
         weights = np.zeros(self.variance.shape)
@@ -104,7 +134,11 @@ class Variances:
 
     def combined_variance(self, weights: np.ndarray | None = None) -> np.ndarray:
         """u'Ru [M], (deg/s)², of one sample of the combination; weights u [M, N], None: those of least variance."""
-        parts = (self.weights() if weights is None else weights) * np.sqrt(self.variance)
+        weights = self.weights() if weights is None else weights
+        if self.added is not None:
+            own = weights * np.sqrt(np.maximum(self.variance - self.added[:, None], 0.0))
+            return np.sum((own @ self.correlation) * own, axis=1) + self.added * np.sum(weights**2, axis=-1)
+        parts = weights * np.sqrt(self.variance)
         if self.moving is not None:
             return np.einsum("bi,bij,bj->b", parts, self.moving, parts)
         return np.sum((parts @ self.correlation) * parts, axis=1)
@@ -140,6 +174,9 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     if pairs.sum() < FEWEST_BLOCKS:
         raise CannotRun(f"fewer than {FEWEST_BLOCKS} blocks with two good gyros", remedy="a longer recording is needed")
     correlation = _correlation(array)
+    every, motion = moments, motion_noise(array, moments) if parameters.in_motion and parameters.has("motion") else None
+    if motion is not None:
+        moments = motion.calm(moments)
     constant, outlier = constant_variances(moments, correlation)
     quiet = False
     if parameters.has("quiet") and not array.at_rest.all():
@@ -151,24 +188,29 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     memories = [CONSTANT] * gyros
     moving, changing = None, changing and parameters.has("changing")
     if changing:
-        found = _changing(array, moments, constant, outlier, correlation, parameters)
+        found = _changing(array, moments, constant, outlier, correlation, parameters, motion is None)
         variance, memories, correlation, moving = found.variance, found.memories, found.correlation, found.moving
     tau = np.array([memory.tau_s for memory in memories])
+    if motion is not None:
+        variance = variance + motion.variance[:, None]
     phi = colour(array, moments, constant)
-    note = _note(moments, correlation, gyros, changing and bool(array.at_rest.all()), moving, quiet)
+    note = _note(every, correlation, gyros, changing and bool(array.at_rest.all()), moving, quiet)
     if even and not np.ptp(variance, axis=1).any():
         note += "; no gyro is shown to be better than another: equal variances"
+    if motion is not None:
+        note += f"; {motion.note}"
     return Variances(
-        moments.start, moments.stop, variance, moments.excluded, tau, correlation, phi, note, moving
+        every.start, every.stop, variance, every.excluded, tau, correlation, phi, note, moving,
+        None if motion is None else motion.variance,
     )  # fmt: skip
 
 
 def _changing(
     array: ArrayRates, moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray,
-    parameters: FilterParameters,
+    parameters: FilterParameters, together: bool = True,
 ) -> Resting:  # fmt: skip
-    """Variances that change, and the correlation, if that changes as well."""
-    engine, together = parameters.engine, parameters.has("changing_correlation")
+    """Variances that change, and the correlation, if that changes as well and may."""
+    engine, together = parameters.engine, together and parameters.has("changing_correlation")
     block_s = float(np.median(moments.size)) / array.rate_hz
     if array.at_rest.all():
         return resting_noise(block_moments(array, own=True), constant, correlation, block_s, engine, together)

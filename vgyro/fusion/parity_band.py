@@ -55,7 +55,7 @@ def in_band(array: ArrayRates, variances: Variances, bandwidth_hz: float) -> tup
     factor = np.where(known, np.exp(off * (1.0 - 1.0 / ratio)), 1.0)
     text = ", ".join(f"{one:.2g}" for one in factor)
     note = f"variances for means of {length} samples, which pass: times {text}"
-    return replace(variances, variance=variances.variance * factor), note
+    return variances.scaled(factor), note
 
 
 def _samples(bandwidth_hz: float, rate_hz: float) -> int:

@@ -9,6 +9,7 @@ PARTS: dict[str, str] = {
     "quantised": "no gyro is better than its step allows",
     "response": "scale factors, delays and poles relative to the array, from the motion",
     "pole": "the sensor's low-pass is undone where it is declared or the motion shows it",
+    "motion": "noise that comes with the motion, in all gyros alike",
     "quiet": "correlations of the noise from the frequencies at which the motion is small",
     "changing": "variances that change with time",
     "changing_correlation": "correlations that change with time",

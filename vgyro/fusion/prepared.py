@@ -13,6 +13,7 @@ import numpy as np
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.clipped import without_clipped
 from vgyro.fusion.missing import unseen
+from vgyro.fusion.motion_noise import motion_noise
 from vgyro.fusion.quantised import grid, with_grid
 from vgyro.fusion.relative import Relative, without_relative
 from vgyro.fusion.tails import without_tails
@@ -59,8 +60,18 @@ def _prepared(array: ArrayRates, parameters: FilterParameters) -> Prepared:
         array, relative, note = without_relative(array)
         notes.append(note)
     if parameters.has("tails"):
-        array, note = without_tails(array, step)
+        array, note = _without_tails(array, step, parameters)
         notes.append(note)
     array = with_grid(array, known)
     guess = stand_in(array, lost) if parameters.in_motion else None
     return Prepared(array, step, tuple(filter(None, notes)), relative, guess)
+
+
+def _without_tails(array: ArrayRates, step: np.ndarray, parameters: FilterParameters) -> tuple[ArrayRates, str]:
+    """Where the motion adds to the noise a sample far off is no sign of a gyro's tails, and stays as it is."""
+    motion = motion_noise(array) if parameters.in_motion and parameters.has("motion") else None
+    if motion is None:
+        return without_tails(array, step)
+    loud = np.broadcast_to(motion.loud_samples()[:, None], array.rate.shape)
+    found, note = without_tails(replace(array, missing=loud if array.missing is None else loud | array.missing), step)
+    return replace(array, rate=found.rate), note
