@@ -21,7 +21,7 @@ from vgyro.fusion.relative import reference, smoothed, smoothing_window, used
 ROUNDS = 20
 FAR = 25.0
 """A block's square so many times what is expected is a fault, or a burst, and no noise of the motion."""
-LOUD = 0.1
+LOUD = 0.02
 """Blocks in which the motion adds more than this part of the mean variance say nothing of the gyros' own noise."""
 FEWEST_CALM = 64
 """Fewer other blocks are not enough for that."""
