@@ -23,6 +23,8 @@ FAR = 25.0
 """A block's square so many times what is expected is a fault, or a burst, and no noise of the motion."""
 LOUD = 0.02
 """Blocks in which the motion adds more than this part of the mean variance say nothing of the gyros' own noise."""
+FEW = 16
+"""So many blocks are no evidence, those that speak for it most: what one event adds is a fault."""
 FEWEST_CALM = 64
 """Fewer other blocks are not enough for that."""
 
@@ -66,7 +68,8 @@ def motion_noise(array: ArrayRates, moments: BlockMoments | None = None) -> Moti
 
     The mean square of the differences of a block, which has the mean of the gyros' variances, is regressed on a
     constant, ẇ² and w²: no term below 0, weights by what is expected (the likelihood of χ²). It must be likelier than a
-    constant by 2·log Σν for each term, as a variance that changes pays (vgyro.fusion.parity_memory).
+    constant by 2·log Σν for each term, as a variance that changes pays (vgyro.fusion.parity_memory), without the FEW
+    blocks that speak for it most.
     """
     gyros = array.rate.shape[1]
     mean, noise = reference(array, used(array))
@@ -88,7 +91,8 @@ def motion_noise(array: ArrayRates, moments: BlockMoments | None = None) -> Moti
     added = terms[:, 1:] @ np.array(found)
     kept = good & (square < FAR * (usual + added))
     counted = scaled * kept
-    gain = _deviance(square, np.full(len(square), still), counted) - _deviance(square, usual + added, counted)
+    each = np.sort(_deviances(square, still, counted) - _deviances(square, usual + added, counted))
+    gain = float(each[:-FEW].sum())
     price = 2.0 * math.log(max(float(scaled.sum()), 2.0)) * sum(one > 0 for one in found)
     if not (any(found) and gain > price):
         return None
@@ -132,5 +136,5 @@ def _fitted(terms: np.ndarray, square: np.ndarray, freedom: np.ndarray) -> list[
     return [float(one) for one in found / size]
 
 
-def _deviance(square: np.ndarray, expected: np.ndarray, freedom: np.ndarray) -> float:
-    return float(freedom @ (np.log(expected) + square / expected))
+def _deviances(square: np.ndarray, expected: np.ndarray | float, freedom: np.ndarray) -> np.ndarray:
+    return np.asarray(freedom * (np.log(expected) + square / expected))
