@@ -19,9 +19,8 @@ def parity_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """
     found = parity_variances(replace(array, faults=()), parameters, changing=False)
     stuck = found.shares @ found.excluded >= 0.5 * len(array.rate)
-    once = replace(
-        found, start=found.start[:1], stop=found.stop[:1], variance=found.variance[:1], excluded=stuck[None]
-    )  # fmt: skip
+    own = found.variance[:1] - (0.0 if found.added is None else found.added[0])
+    once = replace(found, start=found.start[:1], stop=found.stop[:1], variance=own, excluded=stuck[None], added=None)
     weights = once.weights(parameters.engine)[0]
     return Fused.undelayed(combined(array.rate, weights), weights, found.note)
 
