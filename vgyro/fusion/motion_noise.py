@@ -69,14 +69,18 @@ def motion_noise(array: ArrayRates, moments: BlockMoments | None = None) -> Moti
     The mean square of the differences of a block, which has the mean of the gyros' variances, is regressed on a
     constant, ẇ² and w²: no term below 0, weights by what is expected (the likelihood of χ²). It must be likelier than a
     constant by 2·log Σν for each term, as a variance that changes pays (vgyro.fusion.parity_memory), without the FEW
-    blocks that speak for it most.
+    blocks that speak for it most. Found once for an array.
+    moments : block_moments(array), where they are known
     """
+    return array.once("motion noise", lambda: _found(array, block_moments(array) if moments is None else moments))
+
+
+def _found(array: ArrayRates, blocks: BlockMoments) -> MotionNoise | None:
     gyros = array.rate.shape[1]
     mean, noise = reference(array, used(array))
     window = smoothing_window(array, mean, noise)
     if window is None or gyros < 3:
         return None
-    blocks = block_moments(array) if moments is None else moments
     rate, derivative = (smoothed(array, mean, window, order) for order in (0, 1))
     means = [np.add.reduceat(one**2, blocks.start) / blocks.size for one in (derivative, rate)]
     square, count = _mean_square(blocks)

@@ -74,4 +74,4 @@ def _without_tails(array: ArrayRates, step: np.ndarray, parameters: FilterParame
         return without_tails(array, step)
     loud = np.broadcast_to(motion.loud_samples()[:, None], array.rate.shape)
     found, note = without_tails(replace(array, missing=loud if array.missing is None else loud | array.missing), step)
-    return replace(array, rate=found.rate), note
+    return array if found.rate is array.rate else replace(array, rate=found.rate), note
