@@ -55,6 +55,14 @@ def test_it_must_pay_for_itself(share, seen):
     assert (motion_noise(simulated(2, 0.0, share)[0]) is not None) == seen
 
 
+@pytest.mark.parametrize(("step", "seen"), [(0.24, True), (0.32, False)])
+def test_of_gyros_whose_noise_is_below_their_step_nothing_is_said(step, seen):
+    """The mean variance, with that of the rounding, is (.27 deg/s)² to (.28 deg/s)²."""
+    array, _ = simulated(6)
+    rounded = replace(array, rate=np.asfortranarray(np.round(array.rate / step) * step))
+    assert (motion_noise(rounded) is not None) == seen
+
+
 def test_in_motion_gyros_count_alike_and_at_rest_by_their_noise():
     """Closed form: w ∝ 1/(σ² + q) with q = (a·ẇ)² + (c·w)²."""
     array, truth = simulated(3)

@@ -16,6 +16,7 @@ import numpy as np
 from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.parity_blocks import BlockMoments, block_moments
 from vgyro.fusion.parity_memory import effective_share
+from vgyro.fusion.quantised import steps
 from vgyro.fusion.relative import reference, smoothed, smoothing_window, used
 
 ROUNDS = 20
@@ -69,7 +70,8 @@ def motion_noise(array: ArrayRates, moments: BlockMoments | None = None) -> Moti
     The mean square of the differences of a block, which has the mean of the gyros' variances, is regressed on a
     constant, ẇ² and w²: no term below 0, weights by what is expected (the likelihood of χ²). It must be likelier than a
     constant by 2·log Σν for each term, as a variance that changes pays (vgyro.fusion.parity_memory), without the FEW
-    blocks that speak for it most. Found once for an array.
+    blocks that speak for it most. Gyros whose noise is below their step differ by more where the rate crosses steps: of
+    those nothing is said. Found once for an array.
     moments : block_moments(array), where they are known
     """
     return array.once("motion noise", lambda: _found(array, block_moments(array) if moments is None else moments))
@@ -99,6 +101,8 @@ def _found(array: ArrayRates, blocks: BlockMoments) -> MotionNoise | None:
     gain = float(each[:-FEW].sum())
     price = 2.0 * math.log(max(float(scaled.sum()), 2.0)) * sum(one > 0 for one in found)
     if not (any(found) and gain > price):
+        return None
+    if float(np.median(steps(array))) ** 2 > usual:
         return None
     loud = added > LOUD * usual
     if (good & ~loud).sum() < FEWEST_CALM:
