@@ -32,6 +32,9 @@ FEWEST_BLOCKS = 16
 WORTH = 1.02
 """Variance that the weights so far have over the least possible, below which they stay: noise that comes and goes makes
 correlations look a little smaller than they are."""
+MORE = 1.1
+"""Noise at a flat floor so many times as high as record and differences say counts, though it changes no weights: else
+it is taken for motion."""
 SMALLEST_EIGENVALUE = 1e-3
 """A correlation matrix with a smaller one is too near to singular to weight by."""
 
@@ -263,7 +266,9 @@ def _in_quiet(
     seen = covariance / np.outer(own, own)
     if np.linalg.eigvalsh(seen)[0] < SMALLEST_EIGENVALUE:
         return constant, outlier, correlation, False
-    if float(best @ covariance @ best) < WORTH / float(np.linalg.inv(covariance).sum()):
+    level = float(best @ covariance @ best)
+    common = found.flat and level > MORE * float(best @ (np.outer(sigma, sigma) * correlation) @ best)
+    if level < WORTH / float(np.linalg.inv(covariance).sum()) and not common:
         return constant, outlier, correlation, False
     return own**2, outlier, seen, True
 

@@ -32,6 +32,7 @@ FLAT = 0.15
 EFFICIENCY = 0.947
 """Samples that count, of windows with Hann's taper that overlap by half."""
 FEWEST_WINDOWS = 4
+MOSTLY = 0.5
 MOST_COMMON = 0.9
 """Of what is common at most this share of the variance of the best combination is taken for motion."""
 
@@ -77,7 +78,7 @@ def quiet_noise(
     if length == 0:
         return None
     starts = window_starts(stretches, length)
-    good = good_in(starts, length)
+    good = _together(good_in(starts, length))
     use = good.sum(axis=1) > 1
     starts, good = starts[use], good[use]
     if len(starts) < FEWEST_WINDOWS * 2:
@@ -88,6 +89,16 @@ def quiet_noise(
     group = 2 * (place * parts // len(starts)) + place // 2 % 2
     found = cross_spectra(list(array.rate.T), starts, length, good, group, array.rate_hz)
     return _weighed(found, weights)
+
+
+def _together(good: np.ndarray) -> np.ndarray:
+    """Good gyros [W, N] of windows in which all that are good in most windows are good, where half of them are left.
+
+    The motion cancels in differences of spectra only if they are of the same windows.
+    """
+    usual = good.mean(axis=0) > MOSTLY
+    both = good & usual & (good[:, usual].all(axis=1))[:, None]
+    return both if usual.sum() > 1 and both.any(axis=1).mean() > MOSTLY else good
 
 
 def good_blocks(moments: BlockMoments, starts: np.ndarray, length: int) -> np.ndarray:
