@@ -97,7 +97,8 @@ def _together(good: np.ndarray) -> np.ndarray:
     The motion cancels in differences of spectra only if they are of the same windows.
     """
     usual = good.mean(axis=0) > MOSTLY
-    both = good & usual & (good[:, usual].all(axis=1))[:, None]
+    whole = np.all(good[:, usual], axis=1, keepdims=True)
+    both = good & usual & whole
     return both if usual.sum() > 1 and both.any(axis=1).mean() > MOSTLY else good
 
 
