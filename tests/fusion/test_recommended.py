@@ -141,6 +141,32 @@ def test_the_pole_of_the_sensors_is_undone(make_array):
     np.testing.assert_allclose(undone, np.sin(omega * time), atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "motion",
+    [
+        Motion(
+            "oscillator",
+            {"frequency_hz": 0.35, "damping": 18.6, "second_hz": 0.21, "second_damping": 0.1, "sd": 0.01},
+            RATE_HZ,
+        ),
+        Motion("markov", {"tau_s": 0.1, "sd": 0.05}, RATE_HZ),
+        Motion("random_walk", {"q": 0.01}, RATE_HZ),
+    ],
+    ids=lambda motion: motion.model,
+)
+@pytest.mark.parametrize("standing", [False, True])
+def test_a_constant_rate_is_passed_whatever_the_model(make_array, monkeypatch, motion, standing):
+    """Gain 1 at zero frequency: models without an integrator return to the mean of the motion, and not to zero."""
+    monkeypatch.setattr(smoothed_rows, "shared_motion", lambda *_: motion)
+    array = make_array(12_000, [0.1, 0.1, 0.1, 0.1])
+    at_rest = np.zeros(12_000, dtype=bool)
+    at_rest[:3000] = standing
+    rates = [array.rate + (constant * ~at_rest)[:, None] for constant in (0.0, 0.5)]
+    fused = [METHODS["recommended"].fuse(replace(array, rate=one, at_rest=at_rest), MOVING).rate for one in rates]
+    # Not beside the end of the standstill, where the rate jumps.
+    assert float(np.mean((fused[1] - fused[0])[6000:])) == pytest.approx(0.5, abs=2e-3)
+
+
 @pytest.mark.parametrize(("part_of_pole", "undone"), [(0.49, True), (0.51, False)])
 def test_the_pole_is_undone_only_below_half_its_frequency(make_array, monkeypatch, part_of_pole, undone):
     array, pole_hz = make_array(600, [0.1, 0.1, 0.1]), 40.0

@@ -176,10 +176,24 @@ def without_pole(array: ArrayRates, rate: np.ndarray, time_s: float) -> np.ndarr
 
 def _in_motion(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Smoothed:
     motion, activity = shared_motion(array, parameters), shared_activity(array, parameters)
-    return smooth(
-        signal.rate, signal.variance, array.segment, array.rate_hz, motion, signal.colour, parameters.engine,
+    level = _level(array, signal.rate, signal.variance, motion)
+    found = smooth(
+        signal.rate - level, signal.variance, array.segment, array.rate_hz, motion, signal.colour, parameters.engine,
         *_standstill(array, parameters, signal.variance), activity,
     )  # fmt: skip
+    return replace(found, rate=found.rate + level)
+
+
+def _level(array: ArrayRates, rate: np.ndarray, variance: float | np.ndarray, motion: Motion) -> float:
+    """Mean of the rate where it moves, deg/s, about which two oscillators in a row smooth; 0 for the other models.
+
+    These have a mean among their states. A pair returns to zero, and would draw a constant rate there; its spectrum was
+    chosen without the mean.
+    """
+    if "second_hz" not in motion.parameters:
+        return 0.0
+    told = ~array.at_rest & np.isfinite(variance)
+    return float(np.mean(rate[told])) if told.any() else 0.0
 
 
 def shared_activity(array: ArrayRates, parameters: FilterParameters) -> Activity | None:
@@ -190,6 +204,7 @@ def shared_activity(array: ArrayRates, parameters: FilterParameters) -> Activity
             return None
         known, motion = analysed(array, parameters), shared_motion(array, parameters)
         rate, variance = known.bridged(known.rate(), known.variance())
+        rate = rate - _level(array, rate, variance, motion)
         return find_activity(
             rate, variance, array.segment, array.rate_hz, motion, known.variances.colour(),
             *_standstill(array, parameters, variance),
