@@ -183,7 +183,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     constant, outlier = constant_variances(moments, correlation)
     quiet = False
     if parameters.has("quiet") and not array.at_rest.all():
-        constant, outlier, correlation, quiet = _in_quiet(array, moments, constant, outlier, correlation)
+        constant, correlation, quiet = _in_quiet(array, moments, constant, outlier, correlation)
     even = parameters.has("guard") and not quiet and alike(moments, constant, outlier, correlation)
     if even:
         constant = np.full(gyros, float(constant[~moments.excluded.all(axis=0)].mean()))
@@ -245,8 +245,8 @@ def _correlation(array: ArrayRates) -> np.ndarray:
 
 def _in_quiet(
     array: ArrayRates, moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Variances [N], outliers and correlation as the frequencies show them at which the motion is small.
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Variances [N] and correlation as the frequencies show them at which the motion is small.
 
     Only where that is clearly more likely than what the record and the differences say (vgyro.fusion.parity_quiet).
     """
@@ -258,19 +258,19 @@ def _in_quiet(
     expected = np.outer(sigma, sigma) * correlation
     expected *= len(constant) / float(np.trace(off @ expected @ off.T))
     if found is None or against(found, expected) <= 0.0:
-        return constant, outlier, correlation, False
+        return constant, correlation, False
     covariance = scaled_to_pairs(found.noise(correlation), moments, outlier)
     own = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if not (own > 0).all():
-        return constant, outlier, correlation, False
+        return constant, correlation, False
     seen = covariance / np.outer(own, own)
     if np.linalg.eigvalsh(seen)[0] < SMALLEST_EIGENVALUE:
-        return constant, outlier, correlation, False
+        return constant, correlation, False
     level = float(best @ covariance @ best)
     common = found.flat and level > MORE * float(best @ (np.outer(sigma, sigma) * correlation) @ best)
     if level < WORTH / float(np.linalg.inv(covariance).sum()) and not common:
-        return constant, outlier, correlation, False
-    return own**2, outlier, seen, True
+        return constant, correlation, False
+    return own**2, seen, True
 
 
 def _note(

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from harness import Columns, with_faults
 
+from benchmarks.mimu import AXES, CAPTURES, LONG_S, RATE_HZ, SCALE
 from vgyro.calibration import find_rest
 from vgyro.config import MetricsOptions
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
@@ -20,17 +21,8 @@ from vgyro.fusion.parity_band import in_band
 from vgyro.metrics import Sampling
 from vgyro.tasks.noise import noise_at_rest, record_of
 
-RATE_HZ, SCALE = 62.5, 1 / 16.4
-LONG_S = 15.0
 PASSED_HZ = 1.2
 """Noise bandwidth of the smoother at rest, of 1 Hz."""
-# SOURCE.md of the data: IMUs 1, 3, 5, 7 have the board's axes; on 2, 4, 6, 8 (x', y', z') = (-y, -x, -z).
-ODD, EVEN = (1, 3, 5, 7), (2, 4, 6, 8)
-OTHER = {"x": "y", "y": "x", "z": "z"}
-AXES = {
-    axis: [*(f"imu{n}_g{axis}" for n in ODD), *(f"imu{n}_g{OTHER[axis]}" for n in EVEN)] for axis in ("x", "y", "z")
-}
-CAPTURES = ("exp_1", "exp_2")
 
 
 @cache
