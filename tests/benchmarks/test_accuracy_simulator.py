@@ -189,6 +189,14 @@ def test_biases_of_eight_seeds_are_orthogonal() -> None:
     assert np.mean(wide**2) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("gyros", [4, 6, 16])
+def test_biases_of_eight_seeds_tell_their_common_part_as_they_do_on_average(gyros: int) -> None:
+    """Expected 1, in closed form: E[1/χ²] of N - 1 degrees of freedom is 1/(N - 3)."""
+    drawn = np.array([balanced(seed, "bias", gyros) for seed in range(9, 17)])
+    told = drawn.var(axis=1, ddof=1) * (gyros - 1) / (gyros - 3) / gyros
+    assert np.mean(drawn.mean(axis=1) ** 2 / told) == pytest.approx(1.0, abs=0.02)
+
+
 def test_shorter_shrinks_stretches_and_counts() -> None:
     short = load("bursts").shorter(60.0, 180.0)
     assert (short.rest_s, short.motion_s, short.faults[0].count) == (60.0, 180.0, 2)
