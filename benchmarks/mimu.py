@@ -32,8 +32,8 @@ from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, Fused, Method
 from vgyro.fusion.faults import search_faults
 from vgyro.fusion.registry import run_methods, select
 from vgyro.metrics import Sampling
-from vgyro.tasks.fusion_inputs import noise_of_record
 from vgyro.tasks.noise import noise_at_rest, record_of
+from vgyro.tasks.noise_record import noise_of_record
 from vgyro.tasks.rates_file import FileColumns
 
 SHARED_DATA = "VGYRO_SHARED_DATA"

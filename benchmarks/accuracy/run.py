@@ -24,12 +24,15 @@ from benchmarks.accuracy.trial import Recording, Trial
 from vgyro.calibration import find_rest
 from vgyro.config import FaultOptions, FusionOptions, MetricsOptions, RestOptions
 from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters, Method, Outcome
+from vgyro.fusion.array import TemperatureAtRest
 from vgyro.fusion.faults import search_faults
 from vgyro.fusion.missing import fill_missing
 from vgyro.fusion.registry import run_methods, select
+from vgyro.fusion.rest_temperature import temperature_at_rest
 from vgyro.metrics import Sampling
-from vgyro.tasks.fusion_inputs import in_motion, noise_of_record
+from vgyro.tasks.fusion_inputs import in_motion
 from vgyro.tasks.noise import noise_at_rest, noise_in_motion, record_of
+from vgyro.tasks.noise_record import noise_of_record
 from vgyro.tasks.rates_file import ArrayFile, FileColumns
 
 Row = dict[str, Any]
@@ -104,7 +107,18 @@ def _noise(trial: Trial) -> ArrayNoise:
         sampling = Sampling.of(recording.rate_hz, recording.segment)
         held = {(NOWHERE, name): column for name, column in columns.items()}
         found = noise_at_rest(FileColumns(places, held=held), sampling, MetricsOptions(), "native")
-    return noise_of_record(record_of(found, names, "z", "rest"), names)
+    noise = noise_of_record(record_of(found, names, "z", "rest"), names)
+    if trial.rest is None or trial.rest.temperature is None:
+        return noise
+    return replace(noise, temperature=_slopes_at_rest(trial.rest, noise))
+
+
+def _slopes_at_rest(rest: Recording, noise: ArrayNoise) -> TemperatureAtRest | None:
+    array = ArrayRates(
+        rest.rate, rest.rate_hz, rest.segment, rest.at_rest, noise, temperature=rest.temperature,
+        stretch_time=rest.stretch_time,
+    )  # fmt: skip
+    return temperature_at_rest(array)
 
 
 def score(

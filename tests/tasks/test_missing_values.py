@@ -10,7 +10,7 @@ from task_chain import DEFINITIONS, RATE_HZ, Chain, white
 
 from vgyro.storage.tables import read_columns
 from vgyro.tasks import effects
-from vgyro.tasks.fusion_inputs import read_noise
+from vgyro.tasks.noise_record import read_noise
 from vgyro.tasks.rates_file import read_array, read_temperature
 from vgyro.tasks.report_rates import read_rates
 

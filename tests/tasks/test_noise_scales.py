@@ -7,7 +7,7 @@ from task_chain import Chain, white
 
 from vgyro.metrics import Sampling, allan_scales
 from vgyro.tasks import convert, noise
-from vgyro.tasks.fusion_inputs import noise_of_record, read_noise
+from vgyro.tasks.noise_record import noise_of_record, read_noise
 
 GYROS = ("g1", "g2", "g3")
 INPUTS = {"frames": "frames.parquet", "integrity": "integrity.json", "calibration": "calibration.json"}
@@ -58,3 +58,21 @@ def test_whose_they_are(tmp_path):
     record = noise_record(tmp_path, white(30, 3)).noise()
     own = [noise_of_record(record, list(GYROS), name).scales.own for name in (record["recording"], "other", "")]
     assert own == [True, False, False]
+
+
+def test_the_temperature_coefficients(tmp_path):
+    """Expected: the slopes of the simulation, from the record at rest; none for the fusion of that very recording."""
+    rng, samples = np.random.default_rng(8), 30000
+    celsius = np.linspace(20.0, 50.0, samples)
+    true = np.array([0.02, 0.01, -0.01])
+    rate = 0.05 * rng.standard_normal((samples, 3)) + np.outer(celsius - 25.0, true)
+    chain = Chain(tmp_path, GYROS, temperature=True)
+    chain.frames(rate, celsius)
+    chain.run(convert, {**INPUTS, "reference": []}, ("rates",))
+    chain.run(noise, {"rates": "rates.parquet"}, ("noise.json",))
+    record = chain.noise()
+    found = read_noise(tmp_path / "noise.json", ["g3", "g1"], "other").temperature
+    np.testing.assert_allclose(found.slope, true[[2, 0]], atol=1e-3)
+    assert found.scales.tau[0] == 1.0
+    assert read_noise(tmp_path / "noise.json", list(GYROS), record["recording"]).temperature is None
+    assert "temperature" not in noise_record(tmp_path, white(30, 3)).noise()

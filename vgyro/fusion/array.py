@@ -46,6 +46,34 @@ class AllanScales:
     pairs: np.ndarray
     own: bool = False
 
+    def of(self, gyros: Sequence[int] | np.ndarray) -> AllanScales:
+        """Those of some gyros, by their places."""
+        places = np.asarray(gyros)
+        return replace(self, covariance=self.covariance[:, places][:, :, places])
+
+
+@dataclass(frozen=True)
+class TemperatureAtRest:
+    """Temperature coefficients of N gyros, from a record at rest.
+
+    slope      : array [N], deg/s/K;  covariance : array [N, N] of them
+    nulled     : temperature at which the mean of the biases is zero, °C;  nulled_sd : its s.d., K
+    scales     : Allan covariances without what follows the temperature, from 1 s on; None: the board moved between
+    """
+
+    slope: np.ndarray
+    covariance: np.ndarray
+    nulled: float
+    nulled_sd: float
+    scales: AllanScales | None = None
+
+    def of(self, gyros: Sequence[int] | np.ndarray) -> TemperatureAtRest:
+        """Those of some gyros, by their places."""
+        places = np.asarray(gyros)
+        scales = None if self.scales is None else self.scales.of(places)
+        covariance = self.covariance[np.ix_(places, places)]
+        return replace(self, slope=self.slope[places], covariance=covariance, scales=scales)
+
 
 @dataclass(frozen=True)
 class ArrayNoise:
@@ -56,6 +84,7 @@ class ArrayNoise:
     correlation : array [N, N] of the noise, unit diagonal
     rrw_note    : what to know of the rate random walks
     scales      : Allan covariances over the averaging time; None: no record at rest was long enough
+    temperature : temperature coefficients from another record at rest than the one that is fused; None: not known
     """
 
     arw: np.ndarray
@@ -63,6 +92,7 @@ class ArrayNoise:
     correlation: np.ndarray
     rrw_note: str = ""
     scales: AllanScales | None = None
+    temperature: TemperatureAtRest | None = None
 
     @property
     def R(self) -> np.ndarray:
@@ -71,12 +101,15 @@ class ArrayNoise:
 
     def of(self, gyros: Sequence[int]) -> ArrayNoise:
         """The noise of some gyros, by their places."""
-        rows, columns = np.ix_(np.asarray(gyros), np.asarray(gyros))
-        scales = self.scales
-        if scales is not None:
-            scales = replace(scales, covariance=scales.covariance[:, rows, columns])
-        correlation = self.correlation[rows, columns]
-        return replace(self, arw=self.arw[columns[0]], rrw=self.rrw[columns[0]], correlation=correlation, scales=scales)
+        places = np.asarray(gyros)
+        return replace(
+            self,
+            arw=self.arw[places],
+            rrw=self.rrw[places],
+            correlation=self.correlation[np.ix_(places, places)],
+            scales=None if self.scales is None else self.scales.of(places),
+            temperature=None if self.temperature is None else self.temperature.of(places),
+        )
 
     def with_arw(self, arw: float | None) -> ArrayNoise:
         """The same array with one ARW for every gyro, deg/s/√Hz; None changes nothing."""

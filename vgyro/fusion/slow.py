@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.errors import DataError
-from vgyro.fusion.array import ArrayRates, FilterParameters
+from vgyro.fusion.array import ArrayRates, FilterParameters, TemperatureAtRest
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_choice import Choice, choose
 from vgyro.fusion.slow_common import common_note, common_walk
-from vgyro.fusion.slow_model import Constants, Evidence, Walk, with_shared_slope
+from vgyro.fusion.slow_model import Constants, Evidence, Walk, root_of, with_shared_slope
 from vgyro.fusion.slow_prior import empirical_prior
 from vgyro.fusion.slow_smoother import run_smoother
 from vgyro.units import rrw_deg_h_rt_h
@@ -100,14 +100,26 @@ def slow_errors(
     variance = np.broadcast_to(np.asarray(variance, dtype=float), (len(blocks), gyros))
     noise = array.noise.correlation if correlation is None else correlation
     resting, why = _anchors(array, parameters, blocks)
-    degrees, why_not = _temperature(array, parameters, blocks)
+    degrees, why_not = blocks_temperature(array, blocks)
+    if parameters.temperature == "off" or not parameters.has("temperature"):
+        degrees, why_not = None, "temperature is off" if array.temperature is not None else ""
     centre = 0.0 if degrees is None else float(np.average(degrees, weights=blocks.length))
     relative = None if degrees is None else degrees - centre
-    common = common_walk(array.noise.scales) if parameters.has("slow_common") else 0.0
-    evidence = Evidence.of(array, blocks, variance, noise, resting, relative, common)
     if walk is None and not parameters.has("slow_walk"):
         walk = Walk(np.nan_to_num(array.noise.rrw))
-    choice = choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk)
+
+    def chosen(known: TemperatureAtRest | None) -> tuple[Evidence, Choice, float]:
+        scales = array.noise.scales if known is None or known.scales is None else known.scales
+        common = common_walk(scales) if parameters.has("slow_common") else 0.0
+        since = relative if known is None or relative is None else relative + (centre - known.nulled)
+        evidence = Evidence.of(array, blocks, variance, noise, resting, since, common, known)
+        return evidence, choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk), common
+
+    known = None if relative is None or array.at_rest.all() else array.noise.temperature
+    evidence, choice, common = chosen(known)
+    if known is not None and not choice.slopes:
+        known = None
+        evidence, choice, common = chosen(None)
     constants = empirical_prior(evidence, choice.filtered).posterior(choice.filtered)
     state, covariance = run_smoother(choice.information, choice.filtered)
     design = evidence.design
@@ -116,19 +128,20 @@ def slow_errors(
         so_far, _ = _with_constants(state, covariance, constants, design)
         constants = with_shared_slope(evidence, choice.walk, so_far, constants)
     bias, covariance = _with_constants(state, covariance, constants, design)
+    if known is not None and relative is not None:
+        bias = bias + np.outer(relative + (centre - known.nulled), known.slope)
+        if not evidence.anchored:
+            covariance += (known.nulled_sd * known.slope.mean()) ** 2
     if common and not evidence.anchored:
         # Seen in nothing, so that it grows from the start on, whether or not the gyros' own walks fade.
         covariance += (common * (blocks.time - blocks.time[0]))[:, None, None]
-    slopes = slice(evidence.plain, None)
-    warming = (
-        Temperature(constants.mean[slopes], constants.covariance[slopes, slopes], centre) if choice.slopes else None
-    )
+    warming = _slopes(evidence, constants, known, centre) if choice.slopes else None
     parts = (
         why,
         why_not,
         _of_walk(array, choice.walk),
         common_note(common),
-        _of_temperature(choice, evidence.anchored, constant_rate),
+        _of_temperature(choice, evidence, constant_rate),
     )
     note = "; ".join(filter(None, parts))
     return SlowErrors(blocks, bias, covariance, evidence.anchored, warming, choice.walk, constants, note)
@@ -168,12 +181,10 @@ def _anchors(array: ArrayRates, parameters: FilterParameters, blocks: SlowBlocks
     return resting, f"pinned to zero rate by {seconds:.4g} s of standstill; the Earth's rate there is taken for bias"
 
 
-def _temperature(array: ArrayRates, parameters: FilterParameters, blocks: SlowBlocks) -> tuple[np.ndarray | None, str]:
+def blocks_temperature(array: ArrayRates, blocks: SlowBlocks) -> tuple[np.ndarray | None, str]:
     """Temperature of the blocks [B], °C, where it can be regressed on; else None and why."""
     if array.temperature is None:
         return None, ""
-    if parameters.temperature == "off" or not parameters.has("temperature"):
-        return None, "temperature is off"
     degrees = blocks.mean(array.temperature)
     known = np.isfinite(degrees)
     if not known.all():
@@ -194,9 +205,21 @@ def _of_walk(array: ArrayRates, walk: Walk) -> str:
     return f"K = {sizes} deg/h/√h{fading}, by likelihood (2Δ log L = {walk.gain:.1f})"
 
 
-def _of_temperature(choice: Choice, anchored: bool, constant_rate: bool) -> str:
+def _slopes(evidence: Evidence, constants: Constants, known: TemperatureAtRest | None, reference: float) -> Temperature:
+    slopes = slice(evidence.plain, None)
+    mean, covariance = constants.mean[slopes], constants.covariance[slopes, slopes]
+    if known is None:
+        return Temperature(mean, covariance, reference)
+    root = root_of(known.covariance)
+    return Temperature(known.slope + root @ mean, root @ covariance @ root, reference)
+
+
+def _of_temperature(choice: Choice, evidence: Evidence, constant_rate: bool) -> str:
     if not np.isfinite(choice.slopes_gain):
         return ""
+    if evidence.known_slopes:
+        return "the temperature coefficients are those of the record at rest, and what the differences say of them"
+    anchored = evidence.anchored
     compared = f"2Δ log L = {choice.slopes_gain:.1f}, {choice.needed:.1f} needed"
     if not choice.slopes:
         return f"not regressed on the temperature ({compared})"

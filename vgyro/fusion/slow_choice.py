@@ -57,13 +57,18 @@ def choose(evidence: Evidence, blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndar
     known : the walks; None: they are chosen
     Both models choose their own walks, so that a walk is not taken for temperature, nor the reverse. The slopes' common
     variance is their one parameter: they are kept if 2Δ log likelihood > log(number of blocks) (BIC; Schwarz 1978), or
-    more if the walks beside them have more parameters.
+    more if the walks beside them have more parameters. Slopes that a record at rest knows are kept unless slopes of
+    another common variance about them are more likely by as much: then they are others than at rest.
     """
     information = evidence.information()
     search = _Search.of(evidence, blocks, rrw, arw)
-    walk = known or search.best(slopes=False)
+    walk = known or search.best(slopes=evidence.known_slopes)
     if not evidence.has_slopes:
         return Choice(walk, information, evidence.filtered(information, walk), False, math.nan, math.nan)
+    if evidence.known_slopes:
+        filtered, needed = evidence.filtered(information, walk), -math.log(len(blocks))
+        gain = 2.0 * (search.weighed(filtered)[1] - search.of_slopes(filtered)[1])
+        return Choice(walk, information, filtered, gain > needed, gain, needed)
     other = known or search.best(slopes=True)
     both = evidence.filtered(information, other)
     without = information.first_regressors(evidence.plain)
@@ -169,19 +174,22 @@ class _Search:
 
     def _likelihoods(self, part: Information, walks: Sequence[Walk]) -> list[float]:
         """Log likelihoods of several walks."""
-        return [self._of(filtered)[1] for filtered in self.evidence.filtered_with(part, walks)]
+        return [self.weighed(filtered)[1] for filtered in self.evidence.filtered_with(part, walks)]
 
     def _likelihood(self, part: Information, walk: Walk) -> tuple[float, np.ndarray]:
         """Log likelihood of a walk, and its derivatives by log K [N]."""
         filtered = self.evidence.filtered(part, walk)
-        prior, value = self._of(filtered)
+        prior, value = self.weighed(filtered)
         return value, log_likelihood_slope(self.evidence, part, filtered, prior, walk.rrw)
 
-    def _of(self, filtered: Filtered) -> tuple[np.ndarray, float]:
-        """Prior of the constants and log likelihood, with the best variance of temperature slopes if there are any."""
-        if len(filtered.squares) > 1 + self.evidence.plain:
+    def weighed(self, filtered: Filtered) -> tuple[np.ndarray, float]:
+        """Prior of the constants and log likelihood, with the best variance of slopes if it is not known."""
+        if len(filtered.squares) == 1 + self.evidence.plain:
+            return self.broad, log_likelihood(filtered, self.broad)
+        if not self.evidence.known_slopes:
             return self.of_slopes(filtered)
-        return self.broad, log_likelihood(filtered, self.broad)
+        prior = np.concatenate([self.broad, np.ones(self.evidence.gyros)])
+        return prior, log_likelihood(filtered, prior)
 
     def of_slopes(self, filtered: Filtered) -> tuple[np.ndarray, float]:
         """Prior [k] with the common variance of the temperature slopes of the highest likelihood, and its log."""

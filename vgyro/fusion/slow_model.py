@@ -16,9 +16,12 @@ from typing import Literal
 import numpy as np
 
 from vgyro.errors import DataError
-from vgyro.fusion.array import ArrayRates
+from vgyro.fusion.array import ArrayRates, TemperatureAtRest
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filters
+
+WIDE = 100.0
+"""Variance of the temperature slope that all share, beforehand, of that with which a rate that is constant shows it."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,8 @@ class Evidence:
     steps  : variances beforehand of the steps, (deg/s)²
     walks  : correlation [N, N] of the random walks;  common : variance of a walk that all share, (deg/s)²/s
     anchored : standstill makes the common part seen in some of the blocks
+    known_slopes : the temperature slopes are √Γ·z, with independent normal z of variance 1 beforehand, Γ being the
+        covariance that a record at rest left of them; its slopes are taken off
     """
 
     means: np.ndarray
@@ -64,6 +69,7 @@ class Evidence:
     walks: np.ndarray
     anchored: bool
     common: float = 0.0
+    known_slopes: bool = False
 
     @classmethod
     def of(
@@ -75,12 +81,14 @@ class Evidence:
         resting: np.ndarray,
         temperature: np.ndarray | None,
         common: float = 0.0,
+        slopes: TemperatureAtRest | None = None,
     ) -> Evidence:
         """All blocks of a recording.
 
         variance    : [B, N], (deg/s)² of a sample; not finite or not above 0: the gyro says nothing in this block
         correlation : [N, N] of the noise;  resting : [B] of bool, the board stands still for certain
         temperature : [B], K, about its mean; None: no slopes;  common : variance of a walk that all share
+        slopes      : those of a record at rest; None: nothing is known of them
         """
         used = np.isfinite(variance) & (variance > 0) & ~blocks.at_fault(array)
         weight = _inverse_covariance(used, variance / blocks.length[:, None], correlation)
@@ -89,11 +97,15 @@ class Evidence:
         weight[parity] -= total[parity, :, None] * (total[parity] / total[parity].sum(axis=1)[:, None])[:, None, :]
         weight[~resting & ~parity] = 0.0
         means = np.stack([blocks.mean(column) for column in array.rate.T], axis=1)
+        root = None
+        if slopes is not None and temperature is not None:
+            means -= np.outer(temperature, slopes.slope)
+            root = root_of(slopes.covariance)
         # G1 = 0: a rate that all share is taken out first, so that not even its rounding is left.
         shared = np.where(resting, 0.0, means.mean(axis=1))
         means -= shared[:, None]
         steps = blocks.steps(array)
-        design = _design(len(blocks), means.shape[1], steps, temperature)
+        design = _design(len(blocks), means.shape[1], steps, temperature, root)
         sizes = np.array([size**2 for _, _, size in steps])
         return cls(
             means,
@@ -106,6 +118,7 @@ class Evidence:
             array.noise.correlation,
             bool(resting.any()),
             common,
+            root is not None,
         )
 
     @property
@@ -159,7 +172,7 @@ class Evidence:
 
     def _cleared(self, filtered: Filtered) -> Filtered:
         squares = filtered.squares.copy()
-        starts = () if self.anchored else (1, 1 + self.plain)
+        starts = () if self.anchored else (1, 1 + self.plain)[: 1 if self.known_slopes else 2]
         for start in starts:
             rows = slice(start, start + self.gyros)
             if start < len(squares):
@@ -176,8 +189,12 @@ def _design(
     gyros: int,
     steps: list[tuple[int, int, float]],
     temperature: np.ndarray | None,
+    root: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Regressors [B, N, k] of the constants: the temperature's come after the biases and steps."""
+    """Regressors [B, N, k] of the constants: the temperature's come after the biases and steps.
+
+    root : √Γ [N, N], of slopes that are √Γ·z
+    """
     plain = gyros + len(steps)
     design = np.zeros((blocks, gyros, plain if temperature is None else plain + gyros))
     each = np.arange(gyros)
@@ -185,8 +202,14 @@ def _design(
     for number, (back, gyro, _) in enumerate(steps):
         design[back:, gyro, gyros + number] = 1.0
     if temperature is not None:
-        design[:, each, plain + each] = temperature[:, None]
+        design[:, :, plain:] = temperature[:, None, None] * (np.eye(gyros) if root is None else root)
     return design
+
+
+def root_of(covariance: np.ndarray) -> np.ndarray:
+    """√Γ, symmetric."""
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 def _inverse_covariance(used: np.ndarray, variance: np.ndarray, correlation: np.ndarray) -> np.ndarray:
@@ -279,7 +302,10 @@ def with_shared_slope(evidence: Evidence, walk: Walk, bias: np.ndarray, constant
     score = squares[2, 0] - squares[1, 0] * squares[1, 2] / squares[1, 1]
     along = np.zeros(len(constants.mean))
     along[evidence.plain :] = mean
-    known = constants.covariance @ along
+    # What the differences say of the slopes' spread says nothing of their common part.
+    shared = np.r_[np.zeros(evidence.plain), np.ones(evidence.gyros)]
+    before = constants.covariance + WIDE / seen * np.outer(shared, shared)
+    known = before @ along
     gain = known / (along @ known + 1.0 / seen)
-    covariance = constants.covariance - np.outer(gain, known)
+    covariance = before - np.outer(gain, known)
     return Constants(constants.mean + gain * (score / seen), covariance)

@@ -62,12 +62,13 @@ def empirical_prior(evidence: Evidence, filtered: Filtered) -> Prior:
 
     far off : a normal variable of the variance of the gyro's own square, which costs FAR_OFF
     The posterior of s under 1/s makes the variance of the centre such that error²/variance is 1 on average: that of the
-    mean of N normal variables, times (N - 1)/(N - 3). Temperature slopes: one variance, its posterior mean likewise.
+    mean of N normal variables, times (N - 1)/(N - 3). Temperature slopes that no record at rest knows: one
+    variance, its posterior mean likewise.
     Gelman et al. (2013), Bayesian Data Analysis, ch. 5 (hierarchical normal model).
     """
     gyros, many = evidence.gyros, len(filtered.squares) - 1
     groups = [slice(0, gyros)]
-    if many > evidence.plain:
+    if many > evidence.plain and not evidence.known_slopes:
         groups.append(slice(evidence.plain, many))
     looks = [_Look.of(filtered, group) for group in groups]
     open_wide = [np.full(gyros, look.open_wide) for look in looks]
@@ -76,7 +77,9 @@ def empirical_prior(evidence: Evidence, filtered: Filtered) -> Prior:
         shared = [np.isin(np.arange(many), np.r_[group]) for group in groups]
         sums, centres = np.column_stack([sums, *shared]), np.array([look.open_wide for look in looks])
     slopes: list[np.ndarray] = []
-    if len(groups) > 1:
+    if evidence.known_slopes and many > evidence.plain:
+        slopes = [np.ones(gyros)]
+    elif len(groups) > 1:
 
         def with_slopes(variance: np.ndarray) -> np.ndarray:
             return np.concatenate([open_wide[0], evidence.steps, variance, centres])

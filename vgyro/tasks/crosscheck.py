@@ -17,7 +17,8 @@ from vgyro.storage.tables import read_column, read_columns, read_metadata, read_
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.crosscheck_rows import Row, columns_of, compare
 from vgyro.tasks.crosscheck_windows import window_rows
-from vgyro.tasks.fusion_inputs import in_motion, read_noise
+from vgyro.tasks.fusion_inputs import in_motion
+from vgyro.tasks.noise_record import read_noise
 from vgyro.tasks.rates_file import has_moved, incomplete, read_array, read_frame
 
 FILTER_SAMPLES = 2000

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -14,11 +14,12 @@ import pyarrow.parquet as pq
 from vgyro.board import Board
 from vgyro.config import MODELS, MODES, FusionOptions, VolatilityOptions
 from vgyro.dataset import AT_REST
-from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights, block_of_sample
-from vgyro.fusion.array import AllanScales, WeightKey
+from vgyro.fusion import ArrayRates, FilterParameters, SampleWeights, block_of_sample
+from vgyro.fusion.array import WeightKey
 from vgyro.fusion.events import FaultEvent, FaultKind
-from vgyro.storage.tables import ROW_GROUP, read_batches, read_columns, read_json, read_metadata, read_rows
+from vgyro.storage.tables import ROW_GROUP, read_batches, read_columns, read_metadata, read_rows
 from vgyro.tasks.common import Task
+from vgyro.tasks.noise_record import read_noise
 from vgyro.tasks.rates_file import ArrayFile, read_array, read_temperature, samples_before, stretch_times, thermometers
 from vgyro.tasks.volatility_series import LEVEL, MOVED
 
@@ -115,28 +116,6 @@ def in_motion(kind: str, at_rest: np.ndarray, moved: bool) -> bool:
     if kind in AT_REST:
         return moved
     return not (kind == "free" and bool(at_rest.all()))
-
-
-def read_noise(path: Path, gyros: list[str], recording: str = "") -> ArrayNoise:
-    """Noise of an array from noise/<axis>.json; a coefficient that was not found is NaN.  recording : the fused one"""
-    return noise_of_record(read_json(path), gyros, recording)
-
-
-def noise_of_record(record: Mapping[str, Any], gyros: list[str], recording: str = "") -> ArrayNoise:
-    """Noise of an array from what the stage `noise` wrote (vgyro.tasks.noise.record_of)."""
-    places = [record["gyros"].index(gyro) for gyro in gyros]
-    arw, rrw = (np.array([record[name][gyro] for gyro in gyros], dtype=float) for name in ("arw", "rrw"))
-    correlation = np.array(record["correlation"], dtype=float)[np.ix_(places, places)]
-    limits = [gyro for gyro in gyros if str(record["rrw_source"][gyro]).startswith("upper limit")]
-    note = f"no random walk was found for {', '.join(limits)}: its upper limit stands in" if limits else ""
-    scales = None
-    if "allan_tau" in record:
-        tau, covariance, pairs = (
-            np.array(record[f"allan_{name}"], dtype=float) for name in ("tau", "covariance", "pairs")
-        )
-        own = bool(recording) and record.get("recording") == recording
-        scales = AllanScales(tau, covariance[:, places][:, :, places], pairs, own)
-    return ArrayNoise(arw, rrw, correlation, note, scales)
 
 
 def read_weights(

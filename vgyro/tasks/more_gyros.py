@@ -13,7 +13,8 @@ from vgyro.fusion import FilterParameters
 from vgyro.fusion.more_gyros import MeanCorrelation, analyse
 from vgyro.storage.tables import read_column, read_columns, write_table
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.fusion_inputs import in_motion, read_noise
+from vgyro.tasks.fusion_inputs import in_motion
+from vgyro.tasks.noise_record import read_noise
 from vgyro.tasks.rates_file import has_moved
 
 

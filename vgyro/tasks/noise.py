@@ -32,10 +32,14 @@ from vgyro.metrics import (
 )
 from vgyro.storage.tables import write_json
 from vgyro.tasks.common import Task, run_task
+from vgyro.tasks.noise_record import noise_of_record, scales_record
+from vgyro.tasks.noise_temperature import slopes_of_file
 from vgyro.tasks.rates_file import ArrayFile, FileColumns, has_moved, incomplete, read_frame
 
 ENOUGH_REST_S = 10.0
 LONG_ENOUGH = 30  # samples
+AT_REST = "samples at rest"
+"""Where the noise is from: ArrayNoiseRecord.method."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,8 @@ def main(task: Task) -> None:
     """
     options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
     engine = task.options["analysis"].get("engine", "native")
-    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
+    board = Board.model_validate(task.options["board"])
+    gyros = [gyro.name for gyro in board.array(task.options["axis"])]
     path = source_of(task.inputs["rates"])
     frame = read_frame(path, gyros, task.options["axis"])
     places = [(path, gyro) for gyro in gyros]
@@ -75,7 +80,10 @@ def main(task: Task) -> None:
             logging.warning("not from the samples at rest: %s", reason)
     if found is None:
         found = noise_in_motion(FileColumns(places), frame, engine)
-    write_json(task.output("noise"), record_of(found, gyros, task.options["axis"], path.parent.name))
+    record = record_of(found, gyros, task.options["axis"], path.parent.name)
+    if found.method == AT_REST:
+        record |= slopes_of_file(path, board, gyros, frame.rate_hz, noise_of_record(record, gyros))
+    write_json(task.output("noise"), record)
 
 
 _UNKNOWN = Coefficient(math.nan, math.nan, math.nan)
@@ -127,7 +135,7 @@ def noise_at_rest(
     columns = replace(gyros, cleaned=cleaned)
     correlation = correlation_of(columns, lacking, rate_hz, sampling.stretch, options.confidence).value
     scales = _scales(columns, sampling, engine, lacking)
-    return ArrayNoiseRecord("samples at rest", len(segment) / rate_hz, fits, read, correlation, scales)
+    return ArrayNoiseRecord(AT_REST, len(segment) / rate_hz, fits, read, correlation, scales)
 
 
 def _scales(columns: Sequence[np.ndarray], sampling: Sampling, engine: str, lacking: Sequence[int]) -> Scales | None:
@@ -185,16 +193,8 @@ def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: s
         "rrw_high": {gyro: _number(fit.K.high) for gyro, fit in fits.items()},
         "bias_instability": {gyro: _number(fit.B.value) for gyro, fit in fits.items()},
         "correlation": [[float(value) for value in row] for row in correlation],
-        **_scales_record(found.scales),
+        **scales_record(found.scales),
     }
-
-
-def _scales_record(scales: Scales | None) -> dict[str, Any]:
-    """allan_tau [J] s, allan_covariance [J, N, N] (deg/s)², null for a gyro with too few values, allan_pairs [J]."""
-    if scales is None:
-        return {}
-    covariance = [[[_number(value) for value in row] for row in matrix] for matrix in scales.covariance]
-    return {"allan_tau": scales.tau.tolist(), "allan_covariance": covariance, "allan_pairs": scales.pairs.tolist()}
 
 
 def _usable_arw(fit: NoiseCoefficients, read: float) -> tuple[float, str]:

@@ -26,8 +26,8 @@ from vgyro.simulate import Simulated, Twin, parse_twin, simulate_recording, trut
 from vgyro.simulate.noise import correlation_matrix, pole_of_motion
 from vgyro.simulate.twin import pole_of
 from vgyro.storage.inputs import read_board
-from vgyro.tasks.fusion_inputs import noise_of_record
 from vgyro.tasks.noise import noise_at_rest, record_of
+from vgyro.tasks.noise_record import noise_of_record
 from vgyro.volatility import block_means
 from vgyro.volatility.fits import fit_windows, window_models
 from vgyro.volatility.rolling import weights_of_windows
