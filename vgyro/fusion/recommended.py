@@ -49,7 +49,8 @@ def recommended(array: ArrayRates, parameters: FilterParameters) -> Fused:
         + known.answer_variance(shares),
         late_s=known.late_s,
     )
-    return smoothed(array, parameters, signal)
+    fused = smoothed(array, parameters, signal)
+    return fused if known.guess is None else known.guess.beyond(fused)
 
 
 def passed_hz(array: ArrayRates, parameters: FilterParameters, known: Analysed) -> float:
