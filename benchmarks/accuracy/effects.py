@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.accuracy.scenario import Fault, Gaps, Scenario
-from benchmarks.accuracy.signals import decay_of, poles_in_a_row, stream
+from benchmarks.accuracy.signals import balanced, decay_of, poles_in_a_row, stream
 from benchmarks.accuracy.trial import TrueFault
 
 START_C = 20.0
@@ -50,7 +50,7 @@ def slow_offset(scenario: Scenario, seed: int, part: str, samples: int) -> np.nd
         angle = poles_in_a_row(stream(seed, "tilt"), samples, decay, 2) * np.deg2rad(scenario.tilt.degrees)
         offset += np.outer(np.sin(angle), constants["per_g"])
     if scenario.warm_up:
-        size = scenario.warm_up.sd * stream(seed, f"warm-up {part}").standard_normal(scenario.gyros)
+        size = scenario.warm_up.sd * balanced(seed, f"warm-up {part}", scenario.gyros)
         offset += np.outer(np.exp(-np.arange(samples) / (scenario.warm_up.time_s * scenario.rate_hz)), size)
     return offset
 

@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import f as fisher
 
 from vgyro.fusion import METHODS, FilterParameters
-from vgyro.fusion.array import AllanScales
-from vgyro.fusion.slow_common import SIGNIFICANCE, common_note, common_walk
+from vgyro.fusion.array import AllanScales, ArrayNoise
+from vgyro.fusion.slow_common import SIGNIFICANCE, common_note, common_walk, walk_correlation
 
 GYROS, LENGTH_S = 6, 1024.0
 TAU = 2.0 ** np.arange(-6, 9)
@@ -71,3 +71,36 @@ def test_the_deviation_holds_what_all_gyros_drift_together(make_array) -> None:
             values[not without].append(np.mean(((fused.rate - truth) / fused.sd)[500:-500] ** 2))
     assert 0.4 < np.mean(values[True]) < 2.0
     assert np.mean(values[False]) > 3.0
+
+
+C = np.array([[1.0, 0.6, 0.6], [0.6, 1.0, 0.6], [0.6, 0.6, 1.0]])
+
+
+def noise_of(walks: np.ndarray, size: float = 1.0, rrw: tuple[float, ...] = (1e-3, 2e-3, 1e-3)) -> ArrayNoise:
+    """A record whose last Allan covariance, over 150 s, is its expectation with this correlation of the walks."""
+    noise = ArrayNoise(np.array([0.02, 0.03, 0.02]), np.array(rrw), C)
+    last = noise.R / 150.0 + size * np.outer(noise.rrw, noise.rrw) * walks * 150.0 / 3.0
+    return replace(noise, scales=AllanScales(np.array([1.0, 150.0]), np.stack([noise.R, last]), np.array([599.0, 3.0])))
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
+def test_walks_are_correlated_as_the_noise_or_not_at_all(size: float) -> None:
+    assert (walk_correlation(noise_of(C, size)) == C).all()
+    assert (walk_correlation(noise_of(np.eye(3), size)) == np.eye(3)).all()
+
+
+def test_halfway_between_the_more_likely_one() -> None:
+    """Between ρ = .06 and .51 the likelihood turns."""
+    assert (walk_correlation(noise_of(0.85 * C + 0.15 * np.eye(3))) == C).all()
+    assert (walk_correlation(noise_of(0.1 * C + 0.9 * np.eye(3))) == np.eye(3)).all()
+
+
+def test_what_the_record_does_not_say_stays_as_it_was() -> None:
+    unknown = replace(noise_of(np.eye(3)), scales=None)
+    assert (walk_correlation(unknown) == C).all()
+    alone = noise_of(np.eye(3))
+    assert alone.scales is not None
+    alone.scales.covariance[:, 1:], alone.scales.covariance[:, :, 1:] = np.nan, np.nan
+    assert (walk_correlation(alone) == C).all()
+    copies = replace(noise_of(np.eye(3), rrw=(0.0, 0.0, 0.0)), correlation=np.ones((3, 3)))
+    assert (walk_correlation(copies) == 1.0).all()

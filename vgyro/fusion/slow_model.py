@@ -18,6 +18,7 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.fusion.array import ArrayRates, TemperatureAtRest
 from vgyro.fusion.slow_blocks import SlowBlocks
+from vgyro.fusion.slow_common import walk_correlation
 from vgyro.fusion.slow_smoother import Filtered, Information, run_back, run_filters
 
 WIDE = 100.0
@@ -115,7 +116,7 @@ class Evidence:
             blocks.time,
             design,
             sizes,
-            array.noise.correlation,
+            walk_correlation(array.noise),
             bool(resting.any()),
             common,
             root is not None,
