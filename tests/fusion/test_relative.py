@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,15 @@ from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.fixed import average
 from vgyro.fusion.lowpass import array_delay, pole_times
 from vgyro.fusion.recommended import recommended, recommended_unsmoothed
-from vgyro.fusion.relative import Relative, relative_response, without_relative
+from vgyro.fusion.relative import (
+    Relative,
+    motion_terms,
+    reference,
+    relative_response,
+    relative_variance,
+    used,
+    without_relative,
+)
 
 RATE_HZ, FINER = 50.0, 8
 NOISE = np.array([0.02, 0.03, 0.03, 0.035, 0.04, 0.025])
@@ -144,24 +153,25 @@ def colours(tau: list[float]) -> np.ndarray:
 
 def test_colour_alone_is_no_delay() -> None:
     """All gyros of one colour, none later than another: noise may be coloured where the motion is not."""
-    late, note = array_delay(of_delays([0.0] * 6), colours([FORTY] * 6), 0.005, UNKNOWN)
+    found = array_delay(of_delays([0.0] * 6), colours([FORTY] * 6), 0.005, UNKNOWN)
+    late, note = found.late_s, found.note
     assert late == 0.0
     assert "lowpass_hz" in note
 
 
 def test_colours_that_differ_without_delays_are_no_delay() -> None:
-    assert array_delay(of_delays([0.0] * 6), colours(MIXED), 0.005, UNKNOWN)[0] == 0.0
+    assert array_delay(of_delays([0.0] * 6), colours(MIXED), 0.005, UNKNOWN).late_s == 0.0
 
 
 def test_delays_that_follow_the_colours() -> None:
-    late, _ = array_delay(of_delays(MIXED), colours(MIXED), 0.005, UNKNOWN)
+    late = array_delay(of_delays(MIXED), colours(MIXED), 0.005, UNKNOWN).late_s
     assert late == pytest.approx(np.mean(MIXED), rel=1e-9)
 
 
 @pytest.mark.parametrize(("error_ms", "undone"), [(1.1, True), (1.3, False)])
 def test_delays_follow_the_colours_only_if_they_are_sure(error_ms: float, undone: bool) -> None:
     """Without one of the late gyros, χ² of four at 3.979 ms and one at 7.958 is .8·(3.979 ms/error)²: 9 at 1.186."""
-    late, _ = array_delay(of_delays(MIXED, error_ms / 1000.0), colours(MIXED), 0.005, UNKNOWN)
+    late = array_delay(of_delays(MIXED, error_ms / 1000.0), colours(MIXED), 0.005, UNKNOWN).late_s
     assert (late > 0.0) == undone
 
 
@@ -169,18 +179,19 @@ def test_delays_follow_the_colours_only_if_they_are_sure(error_ms: float, undone
 def test_delays_that_have_another_cause_are_no_evidence(other_ms: float, undone: bool) -> None:
     """Delays of two gyros that no colour explains: the χ² left is below half of all, or above."""
     delays = np.array(MIXED) + np.array([other_ms, -other_ms, 0, 0, 0, 0]) / 1000.0
-    late, _ = array_delay(of_delays(delays.tolist()), colours(MIXED), 0.005, UNKNOWN)
+    late = array_delay(of_delays(delays.tolist()), colours(MIXED), 0.005, UNKNOWN).late_s
     assert (late > 0.0) == undone
 
 
 def test_one_gyro_may_be_late_by_itself() -> None:
     delays = np.array(MIXED) + np.array([0, 0, 0, 0, 0.015, 0])
-    late, _ = array_delay(of_delays(delays.tolist()), colours(MIXED), 0.005, UNKNOWN)
+    late = array_delay(of_delays(delays.tolist()), colours(MIXED), 0.005, UNKNOWN).late_s
     assert late == pytest.approx(np.mean(delays), rel=1e-9)
 
 
 def test_a_declared_low_pass_is_believed() -> None:
-    late, note = array_delay(of_delays([0.0] * 6), np.zeros(6), 0.005, np.full(6, 40.0))
+    found = array_delay(of_delays([0.0] * 6), np.zeros(6), 0.005, np.full(6, 40.0))
+    late, note = found.late_s, found.note
     assert late == pytest.approx(FORTY)
     assert "declared" in note
 
@@ -189,8 +200,32 @@ def test_one_declared_low_pass_is_enough() -> None:
     """The others are as late about it as the motion shows; one gyro is late by itself."""
     declared = np.array([np.nan, 40.0, 20.0, np.nan, 40.0, 40.0])
     delays = np.array(MIXED) + np.array([0, 0, 0, 0, 0.015, 0])
-    late, _ = array_delay(of_delays(delays.tolist()), np.zeros(6), 0.005, declared)
+    late = array_delay(of_delays(delays.tolist()), np.zeros(6), 0.005, declared).late_s
     assert late == pytest.approx(np.mean(delays), rel=1e-9)
+
+
+def test_how_well_the_delay_is_known() -> None:
+    """The low-passes' tolerance, the errors of the delays, and how far the gyros are apart, of a median of six."""
+    tolerance = 0.1 * FORTY
+    exact = array_delay(of_delays([0.0] * 6, 1e-9), np.zeros(6), 0.005, np.full(6, 40.0))
+    assert exact.sd == pytest.approx(tolerance)
+    noisy = array_delay(of_delays([0.0] * 6, 1e-3), np.zeros(6), 0.005, np.full(6, 40.0))
+    assert noisy.sd == pytest.approx(math.hypot(tolerance, 1e-3 * math.sqrt(math.pi / 12)))
+    apart = np.array([-2.0, -1.0, -1.0, 1.0, 1.0, 2.0]) * 1e-3
+    spread = array_delay(of_delays(apart.tolist(), 1e-9), np.zeros(6), 0.005, np.full(6, 40.0))
+    assert spread.sd == pytest.approx(math.hypot(tolerance, 1.4826e-3 * math.sqrt(math.pi / 12)))
+    assert math.isnan(array_delay(of_delays([0.0] * 6), colours([FORTY] * 6), 0.005, UNKNOWN).sd)
+
+
+def test_a_known_delay_counts_with_its_own_error() -> None:
+    rng = np.random.default_rng(3)
+    motion = np.convolve(rng.standard_normal(60 * 400 + 79), np.hanning(80) / 3.0, "valid")
+    array = array_of(3, [motion] * 6)
+    found = replace(of_delays([0.0] * 6), window=11)
+    shares = np.full(6, 1 / 6)
+    known, unknown = (relative_variance(array, found, shares, sd) for sd in (2e-3, math.nan))
+    terms = np.square(motion_terms(array, reference(array, used(array))[0], 11)[:, 1])
+    np.testing.assert_allclose(unknown - known, terms * (1e-6 / 6 * 5 / 3 - 4e-6), rtol=1e-6, atol=1e-12)
 
 
 def test_pole_times() -> None:

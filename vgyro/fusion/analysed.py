@@ -7,13 +7,14 @@ included (vgyro.fusion.parity). Slow errors b: vgyro.fusion.slow. The motion: vg
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights
-from vgyro.fusion.lowpass import array_delay
+from vgyro.fusion.lowpass import ArrayDelay, array_delay
 from vgyro.fusion.missing import unseen
 from vgyro.fusion.motion_models import Motion
 from vgyro.fusion.motion_shared import shared_lines
@@ -33,7 +34,7 @@ class Analysed:
 
     array : as prepared;  variances : R_t;  weights : of least variance for it;  slow : b;  note : what was chosen
     relative : answers of the gyros to the motion, taken off; None: not known
-    late_s : how late the array is, s, where that is known; 0: as late as its gyros
+    late_s : how late the array is, s, where that is known; 0: as late as its gyros;  late_sd : of it, s, or NaN
     guess : what is likely where no gyro says anything; None: there are no such samples, or nothing is known
     """
 
@@ -44,6 +45,7 @@ class Analysed:
     note: str
     relative: Relative | None = None
     late_s: float = 0.0
+    late_sd: float = math.nan
     guess: StandIn | None = None
 
     def rate(self) -> np.ndarray:
@@ -69,7 +71,8 @@ class Analysed:
         """Variance [T], (deg/s)², of what scale factors, delays and poles leave in the rate; weights [M, N]."""
         if self.relative is None:
             return 0.0
-        return relative_variance(self.array, self.relative, self.variances.shares @ weights / len(self.array.rate))
+        shares = self.variances.shares @ weights / len(self.array.rate)
+        return relative_variance(self.array, self.relative, shares, self.late_sd)
 
     def at_samples(self, variance: np.ndarray) -> np.ndarray:
         """Variances [M] of the blocks at the samples [T]; infinite where no gyro says anything."""
@@ -128,19 +131,19 @@ def _analysed(raw: ArrayRates, parameters: FilterParameters) -> Analysed:
     slow = slow_errors(array, parameters, white, variances.correlation, blocks)
     if not parameters.has("slow"):
         slow = replace(slow, bias=np.zeros_like(slow.bias))
-    late, of_delay = _late(array, parameters, ready.relative, variances.phi)
+    late = _late(array, parameters, ready.relative, variances.phi)
     left_out = f"{len(array.faults)} faults left out" if array.faults else ""
-    notes = [*ready.notes, variances.note, slow.note, of_delay, left_out]
+    notes = [*ready.notes, variances.note, slow.note, late.note, left_out]
     weights = variances.sample_weights(parameters.engine)
     note = "; ".join(one for one in notes if one)
-    return Analysed(array, variances, weights, slow, note, ready.relative, late, ready.guess)
+    return Analysed(array, variances, weights, slow, note, ready.relative, late.late_s, late.sd, ready.guess)
 
 
 def _late(
     array: ArrayRates, parameters: FilterParameters, relative: Relative | None, phi: np.ndarray
-) -> tuple[float, str]:  # fmt: skip
+) -> ArrayDelay:  # fmt: skip
     if not parameters.has("pole"):
-        return 0.0, ""
+        return ArrayDelay()
     declared = np.full(len(phi), np.nan) if array.lowpass_hz is None else array.lowpass_hz
     return array_delay(relative, phi, array.period, declared)
 

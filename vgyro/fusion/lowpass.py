@@ -8,6 +8,7 @@ believed only where the gyros differ in colour, and the delays between them, see
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,22 +19,37 @@ SURE = 3.0
 
 Where the gyros are alike the χ² speaks against the colours by as much as they are apart: chance hardly gets here.
 """
+TOLERANCE = 0.1
+"""Of a low-pass's time constant, 1σ: as data sheets have it, and alike in all gyros of one kind."""
+MAD = 1.4826
+"""Standard deviation over median absolute deviation, of normal variables."""
 EXPLAINED = 0.5
 """What the colours leave of the delays' χ², at most: delays that have another cause, too, are no evidence of poles."""
 
 
-def array_delay(relative: Relative | None, phi: np.ndarray, period: float, declared: np.ndarray) -> tuple[float, str]:
-    """Delay of the mean of the gyros, s, and how it is known; 0 and a note where it is not.
+@dataclass(frozen=True)
+class ArrayDelay:
+    """Delay of the mean of the gyros, s; 0: not known.  sd : of it, s, NaN where it is not known;  note : how it is"""
+
+    late_s: float = 0.0
+    sd: float = math.nan
+    note: str = ""
+
+
+def array_delay(relative: Relative | None, phi: np.ndarray, period: float, declared: np.ndarray) -> ArrayDelay:
+    """Delay of the mean of the gyros, and how it is known; 0 and a note where it is not.
 
     relative : the gyros' delays about their mean;  phi [N] : correlation of the noise from one sample to the next
     declared : [N] Hz, -3 dB frequency of each gyro's first-order low-pass; NaN: not known; of one gyro it is enough
     The array's delay is that of a low-pass less what its gyro is late about the array: the median of the gyros.
+    Its variance is that of the median of so many, as far as they are apart, and of TOLERANCE of the low-passes.
     """
     if relative is None:
-        return 0.0, ""
+        return ArrayDelay()
     delay, told = relative.value[:, 1], np.isfinite(declared)
     if told.any():
-        late = float(np.median(1.0 / (2.0 * math.pi * declared[told]) - delay[told]))
+        tau = 1.0 / (2.0 * math.pi * declared[told])
+        each = tau - delay[told]
         how = "low-pass as declared"
     else:
         tau = pole_times(phi, period)
@@ -41,10 +57,15 @@ def array_delay(relative: Relative | None, phi: np.ndarray, period: float, decla
             slowest = float(tau.max())
             why = "which is not undone: no lowpass_hz is declared, and no delay shows it"
             pole_hz = 1.0 / (2.0 * math.pi * slowest) if slowest else math.nan
-            return 0.0, f"the noise is coloured as by a low-pass at {pole_hz:.3g} Hz, {why}" if slowest else ""
-        late = float(np.median(tau - delay))
+            said = f"the noise is coloured as by a low-pass at {pole_hz:.3g} Hz, {why}" if slowest else ""
+            return ArrayDelay(note=said)
+        told, each = np.ones(len(tau), dtype=bool), tau - delay
         how = "low-pass by the colour of the noise, and delays between the gyros that follow it"
-    return late, f"{how}: the array's delay of {1000.0 * late:.3g} ms is undone"
+    late = float(np.median(each))
+    apart = MAD * float(np.median(np.abs(each - late)))
+    error = float(np.median(np.diagonal(relative.covariance[1])[told]))
+    sd = math.hypot(math.sqrt(0.5 * math.pi * (apart**2 + error) / len(each)), TOLERANCE * float(np.median(tau)))
+    return ArrayDelay(late, sd, f"{how}: the array's delay of {1000.0 * late:.3g} ms is undone")
 
 
 def pole_times(phi: np.ndarray, period: float) -> np.ndarray:

@@ -321,11 +321,13 @@ def without_relative(array: ArrayRates) -> tuple[ArrayRates, Relative | None, st
     return replace(array, rate=rate), found, found.note
 
 
-def relative_variance(array: ArrayRates, found: Relative, weights: np.ndarray) -> np.ndarray:
+def relative_variance(array: ArrayRates, found: Relative, weights: np.ndarray, delay_sd: float) -> np.ndarray:
     """Variance [T], (deg/s)², of what the answers leave in Σu·y: of their errors, and of what all gyros share.
 
-    weights : [N], Σ = 1
+    weights : [N], Σ = 1;  delay_sd : of the delay that all share where it is known, s; NaN: as their spread has it
     """
-    terms = motion_terms(array, reference(array, used(array))[0], found.window)
-    sizes = found.common + np.einsum("i,kij,j->k", weights, found.covariance, weights)
+    terms, common = motion_terms(array, reference(array, used(array))[0], found.window), found.common
+    if math.isfinite(delay_sd):
+        common[1] = delay_sd**2
+    sizes = common + np.einsum("i,kij,j->k", weights, found.covariance, weights)
     return np.square(terms) @ sizes
