@@ -44,12 +44,17 @@ NO_RATE = ("zero", "constant", "adc_noise")
 
 @dataclass(frozen=True)
 class PartArrays:
-    """One recording as methods take it.  search_note : what faults were not looked for"""
+    """One recording as methods take it.  search_note : what faults were not looked for
+
+    injected : constant rate, deg/s, added to every gyro at rest, and to the truth, as the pipeline does for its second
+        table: at rest the truth is zero, and weights that see the rates themselves draw toward it
+    """
 
     recording: Recording
     array: ArrayRates
     parameters: FilterParameters
     search_note: str
+    injected: float = 0.0
 
     def without(self, parts: frozenset[str]) -> PartArrays:
         """The same for a run without some parts of `recommended`, in which nothing is known yet of the array."""
@@ -85,7 +90,9 @@ def _arrays(recording: Recording, noise: ArrayNoise, declared_hz: float | None) 
     zero = np.zeros((rate.shape[1], 2))
     unknown = replace(array, noise=_unknown(rate.shape[1]))
     search = search_faults(unknown, FaultOptions(), zero, in_hand=recording.kind == "free")
-    return PartArrays(recording, replace(array, faults=tuple(search.events)), parameters, search.note)
+    injected = MetricsOptions().injected_rate or 0.0 if recording.kind == "static" else 0.0
+    array = replace(array, rate=array.rate + injected, faults=tuple(search.events))
+    return PartArrays(recording, array, parameters, search.note, injected)
 
 
 def _unknown(gyros: int) -> ArrayNoise:
@@ -147,7 +154,11 @@ def score_variants(
         return [about | _row(method, "failed", note) for about in common for method in chosen]
     rows = []
     for part, known in arrays.items():
-        common_row = _about(trial, part) | _yardsticks(trial, known.recording, known.array.rate) | _faults(trial, known)
+        common_row = (
+            _about(trial, part)
+            | _yardsticks(trial, known.recording, known.array.rate - known.injected)
+            | _faults(trial, known)
+        )
         for without in variants:
             left = {"without": " ".join(sorted(without))}
             rows += [common_row | left | row for row in _outcomes(known.without(without), chosen)]
@@ -180,7 +191,7 @@ def _outcomes(known: PartArrays, methods: Sequence[Method]) -> Iterator[Row]:
         if outcome.fused is None:
             yield _row(method, outcome.state, outcome.note)
             continue
-        rate, time = outcome.fused.rate, recording.time
+        rate, time = outcome.fused.rate - known.injected, recording.time
         figures = asdict(errors_of(rate, recording.truth, time, recording.rate_hz))
         figures |= asdict(honesty_of(rate, outcome.fused.sd, recording.truth, time))
         yield _row(method, "ran", outcome.note) | figures | {"cpu_s": seconds}

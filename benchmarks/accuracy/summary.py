@@ -37,7 +37,7 @@ class Interval:
 class Cell:
     """One method on one line.
 
-    over : (yardstick, measure) → geometric mean over the seeds of the ratio of the errors;  nees : mean, of those that
+    over : (yardstick, measure) → ratio of the errors, r.m.s. over the seeds;  nees : mean, of those that
     ran;  ran : of `seeds`;  note : why it did not run
     """
 
@@ -123,7 +123,7 @@ def _line(scenario: str, part: str, rows: list[Row]) -> Line:
         methods.setdefault(row["method"], []).append(row)
     trials = list({row["seed"]: row for row in rows}.values())
     oracle, single = (
-        {name: geometric([one[f"{who}_{name}"] / one[f"average_{name}"] for one in trials]).value for name in MEASURES}
+        {name: pooled(trials, f"{who}_{name}", f"average_{name}").value for name in MEASURES}
         for who in ("oracle", "best_gyro")
     )
     oracle["nees"] = float(np.mean([one["oracle_nees"] for one in trials]))
@@ -137,16 +137,31 @@ def _line(scenario: str, part: str, rows: list[Row]) -> Line:
 def _cell(method: str, rows: list[Row]) -> Cell:
     ran = [row for row in rows if row["state"] == "ran"]
     broken = next((row for row in rows if row["state"] != "ran"), None)
-    over = {
-        (who, name): geometric([row[name] / max(row[f"{who}_{name}"], TINY) for row in ran])
-        for who in YARDSTICKS
-        for name in MEASURES
-    }
+    over = {(who, name): pooled(ran, name, f"{who}_{name}") for who in YARDSTICKS for name in MEASURES}
     mean = arithmetic([row["nees"] for row in ran])
     nees = Interval(mean.value, mean.low if math.isnan(mean.low) else max(mean.low, 0.0), mean.high)
     coverage, cpu = (float(np.mean([row[name] for row in ran])) if ran else math.nan for name in ("coverage", "cpu_s"))
     state, note = (broken["state"], broken["note"]) if broken else ("ran", "")
     return Cell(method, over, nees, coverage, cpu, len(ran), len(rows), state, note)
+
+
+def pooled(rows: Sequence[Row], error: str, yardstick: str) -> Interval:
+    """Root of Σ error² over Σ yardstick² over the seeds, and its limits: jackknife of the logarithm, Student's t.
+
+    At rest an error is about one number a seed, the common bias: a mean of the ratios would be ruled by the seeds on
+    which that of the yardstick is nothing by chance.
+    """
+    if not rows:
+        return Interval(math.nan)
+    sums = np.array([[row[error], row[yardstick]] for row in rows]) ** 2
+    logs = 0.5 * np.log(np.maximum(sums.sum(axis=0), TINY**2))
+    value, seeds = float(np.exp(logs[0] - logs[1])), len(rows)
+    if seeds < 2:
+        return Interval(value)
+    without = 0.5 * np.log(np.maximum(sums.sum(axis=0) - sums, TINY**2)) @ [1.0, -1.0]
+    error_of_log = math.sqrt((seeds - 1) / seeds * float(np.sum((without - without.mean()) ** 2)))
+    half = float(student.ppf(0.5 + CONFIDENCE / 2, seeds - 1)) * error_of_log
+    return Interval(value, value * math.exp(-half), value * math.exp(half))
 
 
 def geometric(values: Sequence[float]) -> Interval:

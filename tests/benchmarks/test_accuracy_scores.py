@@ -14,7 +14,7 @@ from benchmarks.accuracy.compare import differences
 from benchmarks.accuracy.demands import demands
 from benchmarks.accuracy.ledger import LEDGER, Ledger, timed
 from benchmarks.accuracy.scores import errors_of, fault_score, honesty_of, second_means
-from benchmarks.accuracy.summary import Line, Row, geometric, ranks, summarised
+from benchmarks.accuracy.summary import Line, Row, geometric, pooled, ranks, summarised
 from benchmarks.accuracy.trial import TrueFault
 from vgyro.fusion.events import FaultEvent
 
@@ -85,9 +85,9 @@ def lines(*rows: Row) -> list[Line]:
     return summarised(rows)
 
 
-def test_ratios_are_geometric_means_over_the_seeds() -> None:
+def test_ratios_are_of_errors_rms_over_the_seeds() -> None:
     [line] = lines(row("a", 1, 0.5), row("a", 2, 2.0), row("b", 1, 0.25), row("b", 2, 0.25))
-    assert line.ratio("a", "full") == pytest.approx(1.0)
+    assert line.ratio("a", "full") == pytest.approx(math.sqrt((0.5**2 + 2.0**2) / 2))
     assert line.ratio("b", "full", "oracle") == pytest.approx(1.0)
     assert line.oracle["sd"] == pytest.approx(0.25)
     assert line.seeds == 2
@@ -103,6 +103,23 @@ def test_the_interval_is_students() -> None:
     found = geometric([math.exp(0.1), math.exp(0.2), math.exp(0.3)])
     assert math.log(found.high) - 0.2 == pytest.approx(4.3027 * 0.1 / math.sqrt(3), rel=1e-4)
     assert math.isnan(geometric([2.0]).low)
+
+
+def test_the_interval_of_a_ratio_is_of_the_jackknife() -> None:
+    """Closed form with three seeds: the logarithm of the ratio of sums without each."""
+    rows = [{"a": one, "b": 1.0} for one in (1.0, 1.2, 0.9)]
+    found = pooled(rows, "a", "b")
+    without = np.log([(1.44 + 0.81) / 2, (1.0 + 0.81) / 2, (1.0 + 1.44) / 2]) / 2
+    error = math.sqrt(2 / 3 * np.sum((without - without.mean()) ** 2))
+    assert math.log(found.high / found.value) == pytest.approx(4.3027 * error, rel=1e-4)
+    assert math.log(found.value / found.low) == pytest.approx(4.3027 * error, rel=1e-4)
+    assert math.isnan(pooled(rows[:1], "a", "b").low)
+
+
+def test_an_average_that_is_right_by_chance_decides_nothing() -> None:
+    """Two methods of one bias each, .1 and .2 (1σ): on one seed the first is ten thousand times as good by luck."""
+    rows = [{"a": 1e-5, "b": 0.2}, {"a": 0.14, "b": 0.01}, {"a": 0.1, "b": 0.3}]
+    assert pooled(rows, "a", "b").value == pytest.approx(math.sqrt((1e-10 + 0.0196 + 0.01) / (0.04 + 1e-4 + 0.09)))
 
 
 def test_who_does_not_run_on_every_seed_is_last() -> None:

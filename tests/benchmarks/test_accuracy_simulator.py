@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from benchmarks.accuracy import effects
+from benchmarks.accuracy.run import trial_arrays
 from benchmarks.accuracy.scenario import FOLDER, Scenario, load, names
 from benchmarks.accuracy.signals import balanced, decay_of, poles_in_a_row, stream
 from benchmarks.accuracy.simulate import simulate
@@ -224,3 +225,13 @@ def test_files_are_yaml_of_known_keys() -> None:
         if path.stem != "order":
             own = yaml.safe_load(path.read_text(encoding="utf-8"))
             assert set(own) <= set(Scenario.model_fields), path.name
+
+
+def test_at_rest_every_method_is_judged_at_a_rate_that_it_is_not_told() -> None:
+    """As in the pipeline: at rest the truth is zero, and what draws toward zero would look good."""
+    trial = simulate("tails_t4", 1)
+    arrays = trial_arrays(trial)
+    assert trial.rest is not None
+    np.testing.assert_allclose(arrays["rest"].array.rate, trial.rest.rate + 0.05)
+    assert (arrays["rest"].injected, arrays["motion"].injected) == (0.05, 0.0)
+    np.testing.assert_array_equal(arrays["motion"].array.rate, trial.motion.rate)
