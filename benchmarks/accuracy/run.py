@@ -154,11 +154,8 @@ def score_variants(
         return [about | _row(method, "failed", note) for about in common for method in chosen]
     rows = []
     for part, known in arrays.items():
-        common_row = (
-            _about(trial, part)
-            | _yardsticks(trial, known.recording, known.array.rate - known.injected)
-            | _faults(trial, known)
-        )
+        yardsticks = _yardsticks(trial, known.recording, known.array.rate - known.injected)
+        common_row = _about(trial, part) | yardsticks | _faults(trial, known)
         for without in variants:
             left = {"without": " ".join(sorted(without))}
             rows += [common_row | left | row for row in _outcomes(known.without(without), chosen)]
