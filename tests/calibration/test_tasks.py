@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.board import Board, parse_board
 from vgyro.dataset import Manifest
@@ -64,7 +65,8 @@ def run_calibrate(
         "integrity": [path.with_name("integrity.json") for path in frames],
         "references": logs or [],
     }
-    options = {"manifest": record.model_dump(mode="json"), "board": board.model_dump(mode="json"), "dataset": "d"}
+    options = {"manifest": record.model_dump(mode="json"), "board": board.model_dump(mode="json"), "dataset": "d",
+               "analysis": complete()}  # fmt: skip
     calibrate.main(Task(inputs, {"calibration": folder / "calibration.json"}, options, ""))
     return read_json(folder / "calibration.json")
 
@@ -87,7 +89,7 @@ def run_convert(
         "reference": logs or [],
     }
     options = {"manifest": record.model_dump(mode="json"), "board": board.model_dump(mode="json"), "recording": name}
-    task = Task(inputs, {"rates": folder / f"{name}.parquet"}, {**options, "analysis": {"rest": {}}}, "")
+    task = Task(inputs, {"rates": folder / f"{name}.parquet"}, {**options, "analysis": complete()}, "")
     convert.main(task)
     return read_columns(folder / f"{name}.parquet")
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.board import Board
 from vgyro.calibration.figures import FIGURES
@@ -62,7 +63,8 @@ class Lab:
         given = {
             "manifest": record.model_dump(mode="json"),
             "board": self.board.model_dump(mode="json"),
-            "analysis": {"calibration": options},
+            "analysis": complete({"calibration": options}),
+            "dataset": "d",
         }
         calibrate.main(Task(inputs, {"calibration": self.folder / name}, given, ""))
         return read_json(self.folder / name)
@@ -78,7 +80,7 @@ class Lab:
             "manifest": self.manifest.model_dump(mode="json"),
             "board": self.board.model_dump(mode="json"),
             "recording": recording,
-            "analysis": {"rest": {}},
+            "analysis": complete(),
         }
         path = self.folder / f"{recording}-{calibration}.parquet"
         convert.main(Task(inputs, {"rates": path}, given, ""))
@@ -194,7 +196,7 @@ def test_rows_in_pieces_give_the_same_rates(lab: Lab, tmp_path: Path) -> None:
     }
     given = {
         "manifest": lab.manifest.model_dump(mode="json"), "board": lab.board.model_dump(mode="json"),
-        "recording": "static", "analysis": {"rest": {}},
+        "recording": "static", "analysis": complete(),
     }  # fmt: skip
     convert.main(Task(inputs, {"rates": tmp_path / "rates.parquet"}, given, ""))
     pieces = read_columns(tmp_path / "rates.parquet")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.board import Board, parse_board
 from vgyro.storage.tables import Provenance, read_columns, read_json, write_table
@@ -15,7 +16,7 @@ NOWHERE = Provenance({}, "", "")
 RATE_HZ = 50.0
 N = 0.1
 INJECTED = 0.05
-OPTIONS = {"analysis": {"metrics": {"bootstrap": 60, "welch_s": 20.0}, "engine": "reference"}, "axis": "z"}
+OPTIONS = {"analysis": complete({"metrics": {"bootstrap": 60, "welch_s": 20.0}, "engine": "reference"}), "axis": "z"}
 TABLES = ("allan", "spectrum", "metrics", "correlation", "cross_allan", "tones")
 
 

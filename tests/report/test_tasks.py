@@ -128,6 +128,8 @@ def test_an_overview_without_data_sets_says_what_to_do() -> None:
 
 
 def test_links_to_the_papers_pages(tmp_path: Path) -> None:
-    task = Task({"papers": [tmp_path / "papers" / "liu2015.html"]}, {"page": tmp_path / "index.html"}, {}, "")
+    task = Task(
+        {"papers": [tmp_path / "papers" / "liu2015.html"]}, {"page": tmp_path / "index.html"}, {"problems": []}, ""
+    )
     index.main(task)
     assert 'href="papers/liu2015.html"' in task.output("page").read_text(encoding="utf-8")

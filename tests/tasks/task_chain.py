@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from task_options import complete
 
 from vgyro.dataset import Manifest
 from vgyro.storage.tables import Provenance, read_columns, read_json, read_metadata, write_json, write_table
@@ -43,9 +44,10 @@ class Chain:
         record = {"name": "r", "kind": self.kind, "files": "x.bin", "rest": "auto"}
         analysis = {"metrics": {"bootstrap": 60, "welch_s": 10.0}, "crosscheck": {"windows": 3},
                     "volatility": {"window": 50, "step": 10, "rate_hz": 5.0, "definitions": DEFINITIONS}}  # fmt: skip
+        manifest = Manifest.model_validate({"board": "b", "recordings": [record]}).model_dump(mode="json")
         options = {
-            "board": self.board, "manifest": Manifest.model_validate({"board": "b", "recordings": [record]}).model_dump(
-                mode="json"), "axis": "z", "recording": "r", "kind": self.kind, "analysis": analysis, **more,
+            "board": self.board, "manifest": manifest, "axis": "z", "recording": "r", "kind": self.kind,
+            "injected_rate": None, "analysis": complete(analysis), **more,
         }  # fmt: skip
         named = {name: [paths] if isinstance(paths, str) else paths for name, paths in inputs.items()}
         task.main(Task(

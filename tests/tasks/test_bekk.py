@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
+from task_options import complete
 
 from vgyro.engine.covariance import conditional_covariance
 from vgyro.storage.schemas import SCHEMAS
@@ -31,7 +32,14 @@ def task_of(folder: Path, inputs: dict, outputs: dict, **options: object) -> Tas
         "volatility": {"window": WINDOW, "step": STEP, "definitions": DEFINITIONS},
         "crosscheck": {"windows": 3},
     }
-    chosen = {"board": board, "axis": "z", "recording": "r", "kind": "static", "analysis": analysis, **options}
+    chosen = {
+        "board": board,
+        "axis": "z",
+        "recording": "r",
+        "kind": "static",
+        "analysis": complete(analysis),
+        **options,
+    }
     places = {name: [folder / path for path in paths] for name, paths in inputs.items()}
     return Task(places, {name: folder / path for name, path in outputs.items()}, json.loads(json.dumps(chosen)), "code")
 

@@ -1,11 +1,14 @@
 """The code hash decides what runs again: it must see every module that a task can reach, and no other."""
 
+import ast
 import shutil
 from pathlib import Path
 
 import pytest
 
+from vgyro.config import Analysis, FaultOptions, MetricsOptions
 from vgyro.tasks import closure
+from vgyro.tasks.common import Task, UndeclaredOption
 
 
 @pytest.fixture
@@ -62,3 +65,34 @@ def test_imports_inside_functions_count() -> None:
 @pytest.mark.parametrize("module", ["parquet", "ulog", "bag", "numpy_file", "matlab", "mat5", "text.fast", "joined"])
 def test_every_reader_of_logs_counts_for_decoding(module: str) -> None:
     assert f"vgyro.storage.logs.{module}" in closure.import_closure("vgyro.tasks.decode")
+
+
+EVERY = [path.stem for path in Path(closure.__file__).parent.glob("*.py") if "SECTIONS = " in path.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("task", EVERY)
+def test_what_a_task_asks_for_it_names(task: str) -> None:
+    """Every `task.section("x", …)` and `task.engine` of its module is in its SECTIONS, and these are sections."""
+    source = Path(closure.__file__).with_name(f"{task}.py").read_text(encoding="utf-8")
+    asked = {node.args[0].value for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)
+             and isinstance(node.func, ast.Attribute) and node.func.attr == "section"}  # fmt: skip
+    asked |= {"engine"} if "task.engine" in source else set()
+    declared = set(closure.sections_of(f"vgyro.tasks.{task}"))
+    assert asked <= declared
+    assert declared <= {"manifest", "board", *Analysis.model_fields}
+
+
+def test_a_module_that_names_no_sections() -> None:
+    with pytest.raises(ValueError, match=r"vgyro\.tasks\.common names no SECTIONS"):
+        closure.sections_of("vgyro.tasks.common")
+
+
+def test_what_is_not_given_is_no_default() -> None:
+    task = Task({}, {}, {"axis": "z", "analysis": {"metrics": {}}}, "")
+    assert task.section("metrics", MetricsOptions) == MetricsOptions()
+    with pytest.raises(UndeclaredOption, match="'faults' is asked for"):
+        task.section("faults", FaultOptions)
+    with pytest.raises(UndeclaredOption, match="'engine'"):
+        _ = task.engine
+    with pytest.raises(UndeclaredOption, match="'kind'"):
+        task.option("kind")

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.engine import independent
 from vgyro.metrics import allan_deviation
@@ -36,7 +37,15 @@ def task_of(folder: Path, inputs: dict[str, list[str]], outputs: dict[str, str],
         "volatility": {"window": WINDOW, "step": 40, "definitions": DEFINITIONS},
         "crosscheck": {"windows": 3},
     }
-    options = {"board": board, "axis": "z", "recording": "r", "kind": "static", "analysis": analysis, **changes}
+    options = {
+        "board": board,
+        "axis": "z",
+        "recording": "r",
+        "kind": "static",
+        "injected_rate": None,
+        "analysis": complete(analysis),
+        **changes,
+    }
     return Task(
         {name: [folder / path for path in paths] for name, paths in inputs.items()},
         {name: folder / path for name, path in outputs.items()},

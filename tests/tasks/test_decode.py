@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from task_options import complete
 
 from vgyro.dataset import Manifest
 from vgyro.storage.inputs import read_board
@@ -31,7 +32,7 @@ def run(tmp_path):
             "manifest": manifest.model_dump(mode="json"),
             "board": read_board(board, boards=BOARDS).model_dump(mode="json"),
             "recording": "rest",
-            "analysis": {"integrity": integrity or {}, "engine": "native"},
+            "analysis": complete({"integrity": integrity or {}}),
         }
         arguments = ["--input", "files", *map(str, files), "--output", "frames", str(tmp_path / "frames.parquet")]
         arguments += ["--output", "integrity", str(tmp_path / "integrity.json"), "--options", json.dumps(options)]

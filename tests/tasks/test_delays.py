@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from task_chain import RATE_HZ, SIGMA, Chain
+from task_options import complete
 
 from vgyro.board import Board
 from vgyro.tasks import convert, faults, fuse, noise
@@ -39,7 +40,7 @@ def fused(folder, late: float, kind: str = "free"):
     chain.run(faults, {"rates": "rates.parquet", "calibration": "calibration.json"}, ("faults",))
     chain.run(
         fuse, {"rates": "rates.parquet", "noise": "noise.json", "faults": "faults.parquet", "weights": [], "moved": []},
-        ("fused", "methods", "moved"), injected_rate=None, analysis=ANALYSIS,
+        ("fused", "methods", "moved"), analysis=complete(ANALYSIS),
     )  # fmt: skip
     table = chain.table("fused")
     truth = motion(time) if kind == "free" else np.zeros(len(time))

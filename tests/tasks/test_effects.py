@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.board import Board
 from vgyro.storage.schemas import SCHEMAS
@@ -40,7 +41,7 @@ def write_inputs(folder: Path, values: np.ndarray, runs: list[list[int]]) -> Tas
     write_table(folder / "tones.parquet", table, "tones", made, {"rate_hz": 200.0})
     options = {
         "board": board(), "axis": "z", "definition": "level", "kind": "static",
-        "analysis": {"engine": "native", "volatility": {"window": 120, "step": 50}, "metrics": {}},
+        "analysis": complete({"volatility": {"window": 120, "step": 50}}),
     }  # fmt: skip
     inputs = {name: [folder / f"{name}.parquet"] for name in ("series", "tones")}
     return Task(inputs, {"effects": folder / "effects.parquet"}, options, "code")

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
 from vgyro.tasks import faults
@@ -52,7 +53,14 @@ def folder(tmp_path):
 
 
 def task_of(folder, *names, **analysis):
-    options = {"board": board(), "axis": "z", "recording": "r", "kind": "static", "analysis": analysis}
+    options = {
+        "board": board(),
+        "axis": "z",
+        "recording": "r",
+        "kind": "static",
+        "injected_rate": None,
+        "analysis": complete(analysis),
+    }
     files = {"rates": "rates.parquet", "noise": "noise.json", "calibration": "calibration.json",
              "faults": "faults.parquet"}  # fmt: skip
     inputs = {name: [folder / files[name]] for name in names}

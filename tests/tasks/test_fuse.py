@@ -8,6 +8,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.engine import ENGINES
 from vgyro.fusion import METHODS, Fused, Method, blocks
@@ -36,8 +37,16 @@ def board(gyros):
     return {"name": "small", "title": "small", "rate_hz": RATE_HZ, "frame": frame, "gyros": rows}
 
 
-def task_of(folder, inputs, outputs, gyros=GYROS, kind="static", **options):
-    options = {"board": board(gyros), "axis": "z", "recording": "r", "kind": kind, "analysis": ANALYSIS, **options}
+def task_of(folder, inputs, outputs, gyros=GYROS, kind="static", analysis=ANALYSIS, **options):
+    options = {
+        "board": board(gyros),
+        "axis": "z",
+        "recording": "r",
+        "kind": kind,
+        "injected_rate": None,
+        "analysis": complete(analysis),
+        **options,
+    }
     return Task(
         {name: [folder / path for path in paths] for name, paths in inputs.items()},
         {name: folder / path for name, path in outputs.items()},

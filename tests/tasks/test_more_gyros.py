@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
@@ -40,7 +41,7 @@ def run(
     write_table(folder / "rates.parquet", still, "rates", Provenance({}, "", ""), extra)
     inputs = {"rates": [folder / "rates.parquet"], "noise": [folder / "noise" / "z.json"]}
     inputs["correlation"] = [folder / "correlation.parquet"]
-    options = {"board": board(), "axis": "z", "kind": kind, "analysis": {"fusion": fusion or {}}}
+    options = {"board": board(), "axis": "z", "kind": kind, "analysis": complete({"fusion": fusion or {}})}
     out = folder / "more_gyros.parquet"
     more_gyros.main(Task(inputs, {"more_gyros": out}, options, "code"))
     return read_columns(out), read_metadata(out)

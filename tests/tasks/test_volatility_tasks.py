@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from task_options import complete
 
 from vgyro.board import Board
 from vgyro.storage.schemas import SCHEMAS
@@ -47,7 +48,7 @@ def write_series(folder, values, segment=None, rest=None, definition="level", ki
         "axis": "z",
         "definition": definition,
         "kind": kind,
-        "analysis": {"engine": "native", "volatility": {"window": WINDOW, "step": STEP, **analysis}},
+        "analysis": complete({"volatility": {"window": WINDOW, "step": STEP, **analysis}}),
     }
     made = Task({"rates": [folder / "rates.parquet"]}, {"series": folder / "series.parquet"}, options, "code")
     series.main(made)

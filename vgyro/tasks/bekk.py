@@ -24,6 +24,8 @@ from vgyro.volatility.rolling import WindowModels
 from vgyro.volatility.series import window_residuals
 from vgyro.volatility.stretches import Window
 
+SECTIONS = ("board", "engine", "volatility", "crosscheck")
+
 FEWEST_GYROS = 2
 
 
@@ -74,7 +76,7 @@ def main(task: Task) -> None:
     options : as open_series without definition; analysis.crosscheck
     Each definition has the same windows, those with a whole step after them first.
     """
-    options = CrossCheckOptions.model_validate(task.options["analysis"].get("crosscheck", {}))
+    options = task.section("crosscheck", CrossCheckOptions)
     rows: list[Row] = []
     dcc = {path.parent.name: path for path in task.inputs.get("dcc", [])}
     for garch in task.inputs.get("garch", []):

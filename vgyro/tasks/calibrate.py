@@ -30,6 +30,8 @@ from vgyro.tasks.calibrate_thermal import Thermal, read_rests, temperature_recor
 from vgyro.tasks.common import Task, run_task
 from vgyro.units import earth_rate_deg_s
 
+SECTIONS = ("manifest", "board", "calibration", "rest")
+
 KINDS = ("calibration", "thermal", "static")
 STANDARD = "IEEE Std 1431-2004"
 RULE = (
@@ -44,14 +46,14 @@ def main(task: Task) -> None:
     references : logged rates, of the calibration recordings that have one
     outputs : calibration;  options : manifest, board, analysis.calibration, analysis.rest
     """
-    manifest = Manifest.model_validate(task.options["manifest"])
-    board = Board.model_validate(task.options["board"])
-    options = CalibrationOptions.model_validate(task.options.get("analysis", {}).get("calibration", {}))
+    manifest = task.section("manifest", Manifest)
+    board = task.section("board", Board)
+    options = task.section("calibration", CalibrationOptions)
     sources, skipped = usable(task, manifest)
     tables = [source for source in sources if source.recording.kind == "calibration"]
     tests, problems = fit_tests(tables, board, manifest.latitude_deg, options)
     known = {gyro.name: main_fit(gyro.name, tests, board) for gyro in board.gyros}
-    rests = read_rests(sources, board, RestOptions.model_validate(task.options.get("analysis", {}).get("rest", {})))
+    rests = read_rests(sources, board, task.section("rest", RestOptions))
     crossed = cross_axes(tests, board, {name: fit for name, (fit, _) in known.items()}, options)
     gyros = {}
     for gyro in board.gyros:
@@ -67,7 +69,7 @@ def main(task: Task) -> None:
         }
     used = {axis: next((test for test in tests if test.axis == axis), None) for axis in board.axes}
     record = {
-        "dataset": task.options.get("dataset", ""),
+        "dataset": task.option("dataset"),
         "rule": RULE,
         "recordings": {axis: test.name if test else None for axis, test in used.items()},
         "skipped": {**skipped, **problems},

@@ -35,6 +35,17 @@ def code_hash(module: str) -> str:
     return digest.hexdigest()
 
 
+def sections_of(module: str) -> tuple[str, ...]:
+    """SECTIONS of a task's module: what it asks of manifest, board and `analysis`. Read, so that nothing is imported.
+
+    raises : ValueError if it names none
+    """
+    for node in ast.parse(_source(module).read_bytes()).body:
+        if isinstance(node, ast.Assign) and [ast.unparse(one) for one in node.targets] == ["SECTIONS"]:
+            return tuple(ast.literal_eval(node.value))
+    raise ValueError(f"{module} names no SECTIONS")
+
+
 def import_closure(module: str) -> frozenset[str]:
     """Names of all modules of the package that `module` reaches, itself included.
 

@@ -10,12 +10,19 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
 
 from vgyro.errors import VgyroError
 from vgyro.storage.tables import Provenance, sha256_of_file
 
 BUG_EXIT_CODE = 70
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class UndeclaredOption(Exception):
+    """A bug: a task asks for an option that its rule does not give. There are no defaults behind the user's back."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,28 @@ class Task:
     def output(self, name: str) -> Path:
         """The file to write."""
         return self.outputs[name]
+
+    def option(self, name: str) -> Any:
+        """One option, as the rule gave it.  raises : UndeclaredOption"""
+        return self._given(self.options, name)
+
+    def section(self, name: str, model: type[Model]) -> Model:
+        """The manifest, the board, or a section of `analysis`.  raises : UndeclaredOption"""
+        within = self.options if name in ("manifest", "board") else self.options.get("analysis", {})
+        return model.model_validate(self._given(within, name))
+
+    @property
+    def engine(self) -> str:
+        """Who runs the recursions.  raises : UndeclaredOption"""
+        return str(self._given(self.options.get("analysis", {}), "engine"))
+
+    @staticmethod
+    def _given(options: dict[str, Any], name: str) -> Any:
+        if name not in options:
+            raise UndeclaredOption(
+                f"{name!r} is asked for, and not given: name it in SECTIONS of the task, or in its rule"
+            )
+        return options[name]
 
     def provenance(self) -> Provenance:
         """Hashes of inputs, options and code, for the metadata of the artefacts."""

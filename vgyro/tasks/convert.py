@@ -32,6 +32,8 @@ from vgyro.tasks.delays import lateness, noise_left
 from vgyro.tasks.moves import moves_of
 from vgyro.tasks.reference_log import read_reference
 
+SECTIONS = ("manifest", "board", "rest")
+
 MOSTLY_CLIPPED = 0.01
 
 
@@ -40,9 +42,9 @@ def main(task: Task) -> None:
 
     options : manifest, board, recording, analysis.rest
     """
-    manifest = Manifest.model_validate(task.options["manifest"])
-    board = Board.model_validate(task.options["board"])
-    recording = manifest.recording(task.options["recording"])
+    manifest = task.section("manifest", Manifest)
+    board = task.section("board", Board)
+    recording = manifest.recording(task.option("recording"))
     frames = task.input("frames")
     time = read_column(frames, "time")
     integrity = read_json(task.input("integrity"))
@@ -51,7 +53,7 @@ def main(task: Task) -> None:
         board, recording, read_json(task.input("calibration"))["gyros"], values_of(manifest, recording)
     )
     converter.read_temperatures(frames, rate_hz)
-    options = RestOptions.model_validate(task.options["analysis"].get("rest", {}))
+    options = task.section("rest", RestOptions)
     clipped = converter.clipped(frames)
     at_rest = rest_of(converter, frames, time, rate_hz, options)
     moves = moves_of(frames, recording, board.gyros, time, rate_hz, options)

@@ -21,6 +21,8 @@ from vgyro.tasks.fusion_inputs import in_motion
 from vgyro.tasks.noise_record import read_noise
 from vgyro.tasks.rates_file import has_moved, incomplete, read_array, read_frame
 
+SECTIONS = ("board", "engine", "volatility", "fusion", "metrics", "crosscheck")
+
 FILTER_SAMPLES = 2000
 FILTER_TOLERANCE = 1e-9  # of the largest rate
 ALLAN_SERIES, ALLAN_TAUS = 3, 3
@@ -33,8 +35,8 @@ def main(task: Task) -> None:
 
     options : board, axis, recording, kind, analysis (engine, volatility, fusion, crosscheck)
     """
-    options = CrossCheckOptions.model_validate(task.options["analysis"].get("crosscheck", {}))
-    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
+    options = task.section("crosscheck", CrossCheckOptions)
+    gyros = [gyro.name for gyro in task.section("board", Board).array(task.option("axis"))]
     windows, curves = np.random.default_rng(options.seed).spawn(2)
     # Whole series are read before the libraries are loaded: the two need not be in memory together.
     allan = list(allan_rows(task, gyros, curves))
@@ -47,14 +49,14 @@ def main(task: Task) -> None:
 def filter_rows(task: Task, gyros: list[str]) -> Iterator[Row]:
     """The filters of Jiang et al. over the first samples, by filterpy: the sample that differs most."""
     columns = read_metadata(task.input("fused"))["units"]
-    fusion = FusionOptions.model_validate(task.options["analysis"].get("fusion", {}))
+    fusion = task.section("fusion", FusionOptions)
     for name, tau in (("jiang_markov", fusion.tau_s), ("jiang_random_walk", np.inf)):
         if name not in columns:
             continue
         rate = _first_samples(task, gyros)
         ours = read_rows(task.input("fused"), [name], 0, len(rate))[name]
         at_rest = read_columns(task.input("rates"), ["at_rest"])["at_rest"].astype(bool)
-        moving = in_motion(task.options["kind"], at_rest, has_moved(task.input("rates")))
+        moving = in_motion(task.option("kind"), at_rest, has_moved(task.input("rates")))
         parameters = FilterParameters.of(fusion, moving)
         R = read_noise(task.input("noise"), gyros).with_arw(parameters.arw).R
         q = parameters.q or q_for_bandwidth(information(R), parameters.bandwidth_hz, tau)
@@ -67,7 +69,7 @@ def filter_rows(task: Task, gyros: list[str]) -> Iterator[Row]:
 def _first_samples(task: Task, gyros: list[str]) -> np.ndarray:
     """Rates [T, N] of the beginning of the first stretch, deg/s."""
     if incomplete(task.input("rates"), gyros):
-        file = read_array(task.input("rates"), gyros, task.options["axis"])
+        file = read_array(task.input("rates"), gyros, task.option("axis"))
         here = file.segment[:FILTER_SAMPLES] == file.segment[0]
         return file.rate[:FILTER_SAMPLES][here].astype(float)
     found = read_rows(task.input("rates"), ["segment", *gyros], 0, FILTER_SAMPLES)
@@ -82,11 +84,11 @@ def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterat
     """
     curves = read_columns(task.input("allan"), ["series", "kind", "tau", "deviation"])
     names = sorted(set(curves["series"]))
-    file = read_frame(task.input("rates"), gyros, task.options["axis"])
+    file = read_frame(task.input("rates"), gyros, task.option("axis"))
     # A recording in motion at a constant rate has a curve of rate - reference, which is not looked at here.
     if not names or not file.at_rest.any():
         return
-    options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
+    options = task.section("metrics", MetricsOptions)
     sampling = file.rest_sampling(options.most_lost_s)
     rest, whole_segment = file.at_rest, sampling.segment
     for name in rng.permutation(names)[:ALLAN_SERIES]:
@@ -111,7 +113,7 @@ def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterat
 
 
 def _by_other_engine(task: Task, rate: np.ndarray, sampling: Sampling, tau: float) -> float:
-    other = "reference" if task.options["analysis"].get("engine", "native") == "native" else "native"
+    other = "reference" if task.engine == "native" else "native"
     curve = allan_deviation(rate, sampling.rate_hz, np.array([tau]), engine=other, sampling=sampling)
     return float(curve.deviation[0])
 

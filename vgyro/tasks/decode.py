@@ -19,6 +19,8 @@ from vgyro.storage.tables import Provenance, TableWriter, write_json, write_tabl
 from vgyro.storage.verdict import unreadable_record
 from vgyro.tasks.common import Task, run_task
 
+SECTIONS = ("manifest", "board", "integrity", "engine")
+
 
 def main(task: Task) -> None:
     """inputs : files;  outputs : frames, integrity;  options : manifest, board, recording, analysis.{integrity, engine}
@@ -26,16 +28,15 @@ def main(task: Task) -> None:
     A refused recording gets an empty table, a record that says why, and one message on stderr; the other recordings
     go on, and the last rule of the workflow fails.
     """
-    manifest = Manifest.model_validate(task.options["manifest"])
-    board = Board.model_validate(task.options["board"])
-    recording = manifest.recording(task.options["recording"])
-    analysis = task.options["analysis"]
-    options = IntegrityOptions.model_validate(analysis["integrity"])
+    manifest = task.section("manifest", Manifest)
+    board = task.section("board", Board)
+    recording = manifest.recording(task.option("recording"))
+    options = task.section("integrity", IntegrityOptions)
     values = values_of(manifest, recording)
     provenance = _provenance(task)
     try:
         reader = open_recording(
-            task.inputs["files"], recording, board, options, engine=analysis["engine"], array=manifest.array
+            task.inputs["files"], recording, board, options, engine=task.engine, array=manifest.array
         )
         record = decode(reader, task.output("frames"), provenance, _extra(board, values))
         for reason in record.reasons:

@@ -15,6 +15,8 @@ from vgyro.tasks.volatility_series import WHOLE, open_series
 from vgyro.volatility.effects import Garch, RateTone, Sampled
 from vgyro.volatility.verdicts import Effect, explain_array
 
+SECTIONS = ("board", "engine", "volatility", "metrics")
+
 
 def main(task: Task) -> None:
     """inputs : series, tones; garch, of the definition `level` (none: it is not analysed);  outputs : effects
@@ -23,7 +25,7 @@ def main(task: Task) -> None:
     The longest stretch of the series, at most its first million samples, is tested, as in arch_lm.parquet.
     """
     array = open_series(task)
-    metrics = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
+    metrics = task.section("metrics", MetricsOptions)
     values, time = array.table(*array.whole)
     rate_hz = float(read_metadata(task.input("tones"))["rate_hz"])
     sampled = Sampled(time, array.rate_hz, max(1, round(rate_hz / array.rate_hz)), 1.5 / metrics.welch_s)

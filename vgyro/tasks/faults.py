@@ -30,6 +30,8 @@ from vgyro.tasks.rates_file import (
     times_at,
 )
 
+SECTIONS = ("board", "faults")
+
 OFF = "analysis.faults.detect is off: nothing was looked for"
 FIGURES = ("start", "stop", "evidence", "size")
 TEMPERATURES = 101
@@ -41,17 +43,17 @@ def main(task: Task) -> None:
 
     A recording in which nothing could be looked for, or not every kind, has the reason as a note in the metadata.
     """
-    options = FaultOptions.model_validate(task.options["analysis"].get("faults", {}))
-    board = Board.model_validate(task.options["board"])
-    gyros = board.array(task.options["axis"])
+    options = task.section("faults", FaultOptions)
+    board = task.section("board", Board)
+    gyros = board.array(task.option("axis"))
     names = [gyro.name for gyro in gyros]
     rows: list[dict[str, Any]] = []
     note = OFF
     if options.detect == "auto":
-        file = read_array(task.input("rates"), names, task.options["axis"])
+        file = read_array(task.input("rates"), names, task.option("axis"))
         array = array_of(file, read_temperature(file, thermometers(board, names)))
         zero = zero_counts(file.path, gyros, task.inputs.get("calibration", []))
-        search = search_faults(array, options, zero, in_hand=task.options["kind"] == "free" or file.moved)
+        search = search_faults(array, options, zero, in_hand=task.option("kind") == "free" or file.moved)
         note, events = search.note, search.events
         times = times_at(file.path, [sample for one in events for sample in (one.start, one.stop - 1)])
         ends = [one.stop == len(array.rate) for one in events]

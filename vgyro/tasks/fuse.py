@@ -24,6 +24,8 @@ from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.fusion_inputs import OpenArray, open_array
 from vgyro.tasks.rates_file import DEVIATION
 
+SECTIONS = ("board", "engine", "volatility", "fusion")
+
 TEXTS = ("method", "definition", "column", "state", "title", "source", "family", "needs", "inferred")
 FIGURES = ("dc_gain", "bandwidth_hz", "noise_bandwidth_hz", "delay_s")
 Row = dict[str, Any]
@@ -49,7 +51,7 @@ def main(task: Task) -> None:
     with kept_columns(task.output("fused")) as fused:
         rows = [] if note else run_all(opened, fused)
         write_columns(task, "fused", opened, fused, {**extra, **note})
-    why = why_not_moved(opened.injected_rate, task.options["kind"], opened.file.moved)
+    why = why_not_moved(opened.injected_rate, task.option("kind"), opened.file.moved)
     with kept_columns(task.output("moved")) as moved:
         rows = run_moved(opened, rows, moved, why)
         write_columns(

@@ -68,13 +68,12 @@ def open_array(task: Task) -> OpenArray:
     inputs : rates, noise, weights; moved, the weights of the level with the option injected_rate, and faults (both may
              be left out)
     """
-    analysis = task.options["analysis"]
-    fusion = FusionOptions.model_validate(analysis.get("fusion", {}))
-    volatility = VolatilityOptions.model_validate(analysis.get("volatility", {}))
-    board = Board.model_validate(task.options["board"])
-    members = board.array(task.options["axis"])
+    fusion = task.section("fusion", FusionOptions)
+    volatility = task.section("volatility", VolatilityOptions)
+    board = task.section("board", Board)
+    members = board.array(task.option("axis"))
     gyros = [gyro.name for gyro in members]
-    file = read_array(task.input("rates"), gyros, task.options["axis"])
+    file = read_array(task.input("rates"), gyros, task.option("axis"))
     tables = [*task.inputs.get("weights", []), *task.inputs.get("moved", [])]
     block_hz = file.rate_hz if volatility.rate_hz == "full" else volatility.rate_hz
     weights, deviations, reasons = read_weights(tables, gyros, file, block_hz)
@@ -87,9 +86,9 @@ def open_array(task: Task) -> OpenArray:
         stretch_time=stretch_times(file), missing=file.missing,
         lowpass_hz=np.array([gyro.lowpass_hz or np.nan for gyro in members]),
     )  # fmt: skip
-    moving = in_motion(task.options["kind"], file.at_rest, file.moved)
-    parameters = FilterParameters.of(fusion, moving, block_hz, analysis.get("engine", "native"))
-    return OpenArray(gyros, file, rates, parameters, fusion, volatility, task.options.get("injected_rate"))
+    moving = in_motion(task.option("kind"), file.at_rest, file.moved)
+    parameters = FilterParameters.of(fusion, moving, block_hz, task.engine)
+    return OpenArray(gyros, file, rates, parameters, fusion, volatility, task.option("injected_rate"))
 
 
 def read_faults(path: Path, gyros: list[str], file: ArrayFile) -> list[FaultEvent]:

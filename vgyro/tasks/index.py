@@ -14,7 +14,7 @@ def main(task: Task) -> None:
     page = task.output("page")
     headlines = [read_json(path) for path in task.inputs.get("headlines", [])]
     papers = [(path.stem, _relative(path, page.parent)) for path in task.inputs.get("papers", [])]
-    write_text(page, render_index(headlines, task.options.get("problems", []), papers))
+    write_text(page, render_index(headlines, task.option("problems"), papers))
 
 
 def _relative(path: Path, folder: Path) -> str:

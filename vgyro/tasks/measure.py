@@ -36,6 +36,8 @@ from vgyro.tasks.measure_missing import Lacking, own_moving, own_still, with_own
 from vgyro.tasks.measure_tables import Results, Rows, Series, write_results
 from vgyro.tasks.rates_file import DEVIATION, ArrayFile, FileColumns, read_frame
 
+SECTIONS = ("board", "engine", "metrics")
+
 FEWEST_SAMPLES = 3  # in the longest stretch, for an Allan deviation
 HEAD = ("time", "segment")
 
@@ -61,9 +63,9 @@ def main(task: Task) -> None:
 
     options : board, axis, recording, kind, analysis.metrics, analysis.engine
     """
-    options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
-    axis, rates = task.options["axis"], task.input("rates")
-    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(axis)]
+    options = task.section("metrics", MetricsOptions)
+    axis, rates = task.option("axis"), task.input("rates")
+    gyros = [gyro.name for gyro in task.section("board", Board).array(axis)]
     frame = read_frame(rates, gyros, axis)
     lacking = Lacking.of(rates, gyros, frame, options.most_lost_s)
     gyros = lacking.gyros
@@ -137,7 +139,7 @@ def still_figures(
 ) -> Still | None:
     """Figures of the samples at rest; of a recording at a constant, known rate: those of rate - reference."""
     where, less, true_rate = frame.at_rest, 0.0, 0.0
-    if task.options["kind"] == "constant" and reference is not None and not where.any():
+    if task.option("kind") == "constant" and reference is not None and not where.any():
         where = np.isfinite(reference)
         less = reference[where]
         true_rate = float(np.mean(less)) if where.any() else 0.0
@@ -148,10 +150,10 @@ def still_figures(
     if longest < FEWEST_SAMPLES:
         return None
     # Between two rests the board may have been turned over.
-    poses = (task.options["kind"] == "free" or frame.moved) and bool(sampling.stretch[-1] > 0)
+    poses = (task.option("kind") == "free" or frame.moved) and bool(sampling.stretch[-1] > 0)
     filters = [one.low_pass for one in series]
     bandwidth_hz = common_bandwidth(filters, options.equal_bandwidth_hz)
-    engine = task.options["analysis"].get("engine", "native")
+    engine = task.engine
     shared = RestRecording.of(sampling, options, bandwidth_hz, engine, poses, run_back(filters))
     columns, back = columns_of(series, where, less, lacking.filled), run_back(filters)
     try:

@@ -98,7 +98,7 @@ def metric_columns(task: Task, found: list[Rows]) -> dict[str, np.ndarray]:
     """metrics.parquet, long: one row a true rate, series and figure, in the order of FIGURES."""
     rows = [
         (
-            task.options["recording"], task.options["axis"], one.method, one.definition, part.true_rate, name,
+            task.option("recording"), task.option("axis"), one.method, one.definition, part.true_rate, name,
             row[name].value, row[name].low, row[name].high, figure.unit, row[name].note,
         )
         for part in found

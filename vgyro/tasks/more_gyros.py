@@ -17,13 +17,15 @@ from vgyro.tasks.fusion_inputs import in_motion
 from vgyro.tasks.noise_record import read_noise
 from vgyro.tasks.rates_file import has_moved
 
+SECTIONS = ("board", "fusion")
+
 
 def main(task: Task) -> None:
     """inputs : rates, noise, correlation;  outputs : more_gyros;  options : board, axis, kind, analysis.fusion"""
-    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
-    options = FusionOptions.model_validate(task.options["analysis"].get("fusion", {}))
+    gyros = [gyro.name for gyro in task.section("board", Board).array(task.option("axis"))]
+    options = task.section("fusion", FusionOptions)
     at_rest = read_column(task.input("rates"), "at_rest")
-    moving = in_motion(task.options["kind"], at_rest, has_moved(task.input("rates")))
+    moving = in_motion(task.option("kind"), at_rest, has_moved(task.input("rates")))
     parameters = FilterParameters.of(options, moving)
     noise = read_noise(task.input("noise"), gyros).with_arw(parameters.arw)
     correlation = read_correlation(task.input("correlation"), gyros)

@@ -36,6 +36,8 @@ from vgyro.tasks.noise_record import noise_of_record, scales_record
 from vgyro.tasks.noise_temperature import slopes_of_file
 from vgyro.tasks.rates_file import ArrayFile, FileColumns, has_moved, incomplete, read_frame
 
+SECTIONS = ("board", "metrics", "engine")
+
 ENOUGH_REST_S = 10.0
 LONG_ENOUGH = 30  # samples
 AT_REST = "samples at rest"
@@ -63,12 +65,12 @@ def main(task: Task) -> None:
 
     options : axis, board, analysis.metrics
     """
-    options = MetricsOptions.model_validate(task.options["analysis"].get("metrics", {}))
-    engine = task.options["analysis"].get("engine", "native")
-    board = Board.model_validate(task.options["board"])
-    gyros = [gyro.name for gyro in board.array(task.options["axis"])]
+    options = task.section("metrics", MetricsOptions)
+    engine = task.engine
+    board = task.section("board", Board)
+    gyros = [gyro.name for gyro in board.array(task.option("axis"))]
     path = source_of(task.inputs["rates"])
-    frame = read_frame(path, gyros, task.options["axis"])
+    frame = read_frame(path, gyros, task.option("axis"))
     places = [(path, gyro) for gyro in gyros]
     sampling = frame.rest_sampling(options.most_lost_s)
     found = None
@@ -80,7 +82,7 @@ def main(task: Task) -> None:
             logging.warning("not from the samples at rest: %s", reason)
     if found is None:
         found = noise_in_motion(FileColumns(places), frame, engine)
-    record = record_of(found, gyros, task.options["axis"], path.parent.name)
+    record = record_of(found, gyros, task.option("axis"), path.parent.name)
     if found.method == AT_REST:
         record |= slopes_of_file(path, board, gyros, frame.rate_hz, noise_of_record(record, gyros))
     write_json(task.output("noise"), record)
@@ -167,7 +169,7 @@ def noise_in_motion(series: Sequence[np.ndarray], frame: ArrayFile, engine: str)
 def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: str) -> dict[str, Any]:
     """JSON: arw and rrw by gyro, such that filters can use them; arw_source and rrw_source say what they are."""
     correlation = np.where(np.isnan(found.correlation), np.eye(len(gyros)), found.correlation)
-    fits = dict(zip(gyros, found.coefficients, strict=True))
+    fits, scales = dict(zip(gyros, found.coefficients, strict=True)), found.scales
     arw = {gyro: _usable_arw(fit, read) for (gyro, fit), read in zip(fits.items(), found.read, strict=True)}
     rrw = {gyro: _usable_rrw(fit) for gyro, fit in fits.items()}
     return {
@@ -193,7 +195,7 @@ def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: s
         "rrw_high": {gyro: _number(fit.K.high) for gyro, fit in fits.items()},
         "bias_instability": {gyro: _number(fit.B.value) for gyro, fit in fits.items()},
         "correlation": [[float(value) for value in row] for row in correlation],
-        **scales_record(found.scales),
+        **({} if scales is None else scales_record(scales.tau, scales.covariance, scales.pairs)),
     }
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from vgyro.fusion.array import AllanScales, ArrayNoise, TemperatureAtRest
-from vgyro.metrics import Scales
 from vgyro.storage.tables import read_json
 
 
@@ -48,15 +47,12 @@ def slopes_of_record(record: Mapping[str, Any], places: list[int]) -> Temperatur
     return TemperatureAtRest(slope, covariance, known["nulled_c"], known["nulled_sd_k"], scales).of(places)
 
 
-def scales_record(scales: Scales | AllanScales | None) -> dict[str, Any]:
+def scales_record(tau: np.ndarray, covariance: np.ndarray, pairs: np.ndarray) -> dict[str, Any]:
     """allan_tau [J] s, allan_covariance [J, N, N] (deg/s)², null for a gyro with too few values, allan_pairs [J]."""
-    if scales is None:
-        return {}
-    covariance = [
-        [[value if math.isfinite(value) else None for value in row] for row in matrix]
-        for matrix in scales.covariance.tolist()
+    known = [
+        [[value if math.isfinite(value) else None for value in row] for row in matrix] for matrix in covariance.tolist()
     ]
-    return {"allan_tau": scales.tau.tolist(), "allan_covariance": covariance, "allan_pairs": scales.pairs.tolist()}
+    return {"allan_tau": tau.tolist(), "allan_covariance": known, "allan_pairs": pairs.tolist()}
 
 
 def scales_of_record(record: Mapping[str, Any], own: bool = False) -> AllanScales | None:

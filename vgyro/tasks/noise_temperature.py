@@ -9,8 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from vgyro.board import Board
-from vgyro.fusion import ArrayNoise, ArrayRates
-from vgyro.fusion.array import TemperatureAtRest
+from vgyro.fusion.array import ArrayNoise, ArrayRates, TemperatureAtRest
 from vgyro.fusion.missing import fill_missing
 from vgyro.fusion.rest_temperature import temperature_at_rest
 from vgyro.tasks.block_means import between, block_means
@@ -45,10 +44,11 @@ def slopes_of_file(path: Path, board: Board, gyros: list[str], rate_hz: float, n
 
 def _record(found: TemperatureAtRest) -> dict[str, Any]:
     """slope [N] deg/s/K, covariance [N, N], nulled_c and nulled_sd_k, and Allan covariances as the record's own."""
+    known = found.scales
     return {
         "slope": found.slope.tolist(),
         "covariance": found.covariance.tolist(),
         "nulled_c": found.nulled,
         "nulled_sd_k": found.nulled_sd,
-        **scales_record(found.scales),
+        **({} if known is None else scales_record(known.tau, known.covariance, known.pairs)),
     }

@@ -17,6 +17,8 @@ from vgyro.tasks.papers_evidence import gather
 from vgyro.tasks.papers_page import paper_page
 from vgyro.tasks.papers_plots import figures
 
+SECTIONS = ("manifest", "board", "volatility", "fusion", "metrics")
+
 
 def main(task: Task) -> None:
     """Read one twin's artefacts, compare, judge, write the page and the CSV files.
@@ -24,16 +26,15 @@ def main(task: Task) -> None:
     inputs  : artefacts;  outputs : page, table1, table2, table3
     options : dataset (the paper's name), manifest, board, analysis (volatility, metrics)
     """
-    analysis = task.options.get("analysis", {})
-    manifest = Manifest.model_validate(task.options["manifest"])
-    board = Board.model_validate(task.options["board"])
-    paper = load_paper(task.options["dataset"])
+    manifest = task.section("manifest", Manifest)
+    board = task.section("board", Board)
+    paper = load_paper(task.option("dataset"))
     evidence = gather(
         task.inputs["artefacts"],
         manifest,
         board,
-        VolatilityOptions.model_validate(analysis.get("volatility", {})),
-        MetricsOptions.model_validate(analysis.get("metrics", {})),
+        task.section("volatility", VolatilityOptions),
+        task.section("metrics", MetricsOptions),
         any(table.select.get("artefact") == "metrics_1hz" for table in paper.tables),
         [name_of(rival) for table in paper.tables for rival in table.rivals()],
     )

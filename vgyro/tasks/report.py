@@ -18,6 +18,8 @@ from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.report_rates import read_rates
 from vgyro.tasks.report_volatility import read_volatility
 
+SECTIONS = ("manifest", "board", "integrity", "rest", "calibration", "volatility", "fusion", "metrics", "crosscheck")
+
 # Long, and drawn nowhere: what is told of them is in allan, spectrum, metrics and arch_lm.
 NOT_READ = ("fused", "moved", "series")
 RESULTS = "results"
@@ -62,9 +64,9 @@ def main(task: Task) -> None:
 
 def read_dataset_part(task: Task) -> DatasetPart:
     """All artefacts of a data set, each in its place."""
-    name = task.options["dataset"]
-    manifest = Manifest.model_validate(task.options["manifest"])
-    board = Board.model_validate(task.options["board"])
+    name = task.option("dataset")
+    manifest = task.section("manifest", Manifest)
+    board = task.section("board", Board)
     placed = {place_of(path, name): path for path in task.inputs.get("artefacts", [])}
     recordings = tuple(
         RecordingPart(
@@ -85,7 +87,7 @@ def read_dataset_part(task: Task) -> DatasetPart:
         {path.stem: read_json(path) for path in task.inputs.get("noise", [])},
         FIGURES,
         CALIBRATION_FIGURES,
-        task.options.get("analysis", {}),
+        task.option("analysis"),
         read_sources(task, placed),
     )
 
@@ -118,7 +120,7 @@ def read_arrays(placed: dict[Place, Path], recording: str, kind: str, board: Boa
 
 def read_sources(task: Task, placed: dict[Place, Path]) -> dict[str, Record]:
     """Path from the data set's folder → metadata of each artefact."""
-    dataset = task.options["dataset"]
+    dataset = task.option("dataset")
     sources: dict[str, Record] = {}
     for path in placed.values():
         sources[inside(path, dataset).as_posix()] = read_metadata(path)

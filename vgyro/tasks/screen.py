@@ -6,10 +6,12 @@ from vgyro.dataset import Manifest
 from vgyro.storage.tables import read_json, write_json
 from vgyro.tasks.common import Task, run_task
 
+SECTIONS = ("manifest",)
+
 
 def main(task: Task) -> None:
     """inputs : integrity, one a recording in the manifest's order;  outputs : screen (JSON);  options : manifest"""
-    manifest = Manifest.model_validate(task.options["manifest"])
+    manifest = task.section("manifest", Manifest)
     recordings = {}
     for recording, path in zip(manifest.recordings, task.inputs["integrity"], strict=True):
         record = read_json(path)
@@ -20,7 +22,7 @@ def main(task: Task) -> None:
             "duration_s": record["duration_s"],
             "rate_hz": record["rate_hz"],
         }
-    write_json(task.output("screen"), {"dataset": task.options["dataset"], "recordings": recordings})
+    write_json(task.output("screen"), {"dataset": task.option("dataset"), "recordings": recordings})
 
 
 if __name__ == "__main__":

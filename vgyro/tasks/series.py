@@ -18,6 +18,8 @@ from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.rates_file import has_moved
 from vgyro.volatility.blocks import BlockMeans, Blocks, RunFinder, Runs, block_length
 
+SECTIONS = ("board", "volatility")
+
 IN_MOTION = ("constant", "random", "sinusoid")
 
 
@@ -26,8 +28,8 @@ def main(task: Task) -> None:
 
     Where the board is known to stand still at times, only those samples are used; a recording in motion is used whole.
     """
-    options = VolatilityOptions.model_validate(task.options["analysis"].get("volatility", {}))
-    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
+    options = task.section("volatility", VolatilityOptions)
+    gyros = [gyro.name for gyro in task.section("board", Board).array(task.option("axis"))]
     path = task.input("rates")
     rate_hz = read_metadata(path).get("rate_hz")
     if rate_hz is None:
@@ -35,7 +37,7 @@ def main(task: Task) -> None:
     length = block_length(float(rate_hz), options.rate_hz)
     share = share_at_rest(path)
     # What is declared to be at rest is no motion to analyse where nothing of it is.
-    whole = task.options.get("kind") in IN_MOTION or (share == 0 and not has_moved(path))
+    whole = task.option("kind") in IN_MOTION or (share == 0 and not has_moved(path))
     runs = find_runs(path, float(rate_hz), length, whole)
     present = present_of(path, gyros)
     # Where no gyro has a value there is no block: that shows only with the gyros.

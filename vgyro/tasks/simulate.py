@@ -39,6 +39,8 @@ from vgyro.tasks.closure import code_hash
 from vgyro.tasks.common import Task, run_task
 from vgyro.validation import InvalidFile
 
+SECTIONS = ("board",)
+
 
 @dataclass(frozen=True)
 class Outputs:
@@ -58,17 +60,15 @@ def main(task: Task) -> None:
     """
     twin_file = task.input("twin")
     twin = parse_twin(twin_file.read_text(encoding="utf-8"), str(twin_file))
-    if "board" in task.inputs:
-        board = read_board(str(task.input("board").resolve()))
-    else:
-        board = Board.model_validate(task.options["board"])
+    given = "board" in task.inputs
+    board = read_board(str(task.input("board").resolve())) if given else task.section("board", Board)
     check(twin, board, str(twin_file))
     outputs = Outputs(
         task.output("dump"), task.output("truth"), task.output("reference") if "reference" in task.outputs else None
     )
-    damage = write_recording(outputs, twin, board, task.options["recording"], None, task.provenance())
+    damage = write_recording(outputs, twin, board, task.option("recording"), None, task.provenance())
     if "damage" in task.outputs:
-        write_json(task.output("damage"), {task.options["recording"]: [item.record() for item in damage]})
+        write_json(task.output("damage"), {task.option("recording"): [item.record() for item in damage]})
 
 
 def simulate_dataset(

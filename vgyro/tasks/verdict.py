@@ -17,7 +17,7 @@ def main(task: Task) -> None:
         if not recording["usable"]
         for reason in recording["reasons"]
     ]
-    complaints = [*task.options["problems"], *refused]
+    complaints = [*task.option("problems"), *refused]
     if complaints:
         listed = "\n  ".join(complaints)
         remedy = f"All the rest is done: {task.input('page')}"

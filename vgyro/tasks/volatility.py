@@ -29,6 +29,8 @@ from vgyro.tasks.volatility_series import WHOLE, ArraySeries, open_series
 from vgyro.volatility.fits import fit_windows
 from vgyro.volatility.windowed import MIN_SAMPLES
 
+SECTIONS = ("board", "engine", "volatility")
+
 Parts = dict[str, list[Path]]
 
 

@@ -21,6 +21,8 @@ from vgyro.volatility.fits import fit_windows, window_models
 from vgyro.volatility.rolling import WindowModels, WindowWeights, weights_of_windows
 from vgyro.volatility.stretches import Window
 
+SECTIONS = ("board", "engine", "volatility")
+
 BATCH_WINDOWS = 512
 BATCH_SAMPLES = 1 << 18
 """A batch holds no more windows, and no more samples of windows (where two overlap, both count), but at least one."""
@@ -37,7 +39,7 @@ def main(task: Task) -> None:
     chunk : "3-of-29", the third of 29 parts of the windows; they differ by one window at most
     """
     array = open_series(task)
-    chunk, chunks = (int(number) for number in str(task.options["chunk"]).split("-of-"))
+    chunk, chunks = (int(number) for number in str(task.option("chunk")).split("-of-"))
     edges = [len(array.plan) * number // chunks for number in (chunk - 1, chunk)]
     write_parts(array, edges[0], edges[1], task.outputs)
 

@@ -111,18 +111,17 @@ def open_series(task: Task, name: str = "series") -> ArraySeries:
     options : board, axis, definition, analysis.engine, analysis.volatility; of the definition `moved`, injected_rate
     raises  : ConfigError if the definition is not known
     """
-    analysis = task.options["analysis"]
-    options = VolatilityOptions.model_validate(analysis.get("volatility", {}))
-    gyros = [gyro.name for gyro in Board.model_validate(task.options["board"]).array(task.options["axis"])]
-    definition, added = task.options["definition"], 0.0
+    options = task.section("volatility", VolatilityOptions)
+    gyros = [gyro.name for gyro in task.section("board", Board).array(task.option("axis"))]
+    definition, added = task.option("definition"), 0.0
     if definition == MOVED:
-        definition, added = LEVEL, float(task.options["injected_rate"])
+        definition, added = LEVEL, float(task.option("injected_rate"))
     if definition not in get_args(Definition):
         raise ConfigError(f"unknown definition {definition!r}", remedy=f"One of {', '.join(get_args(Definition))}")
     path = task.input(name)
     about = read_metadata(path)
     plan = rolling_windows([Window(start, stop) for start, stop, _ in about["runs"]], options.window, options.step)
-    engine = analysis.get("engine", "native")
+    engine = task.engine
     return ArraySeries(path, gyros, about["rate_hz"], plan, options, definition, engine, added)
 
 

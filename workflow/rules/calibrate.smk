@@ -14,7 +14,7 @@ rule calibrate:
         mem_mb=2000,
         runtime=20,
     params:
-        options=stage("manifest", "board", "calibration", "rest"),
+        options=stage("calibrate"),
         code=code("calibrate"),
     shell:
         "python -m vgyro.tasks.calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"
@@ -39,7 +39,7 @@ rule convert:
         mem_mb=3000,
         runtime=20,
     params:
-        options=stage("manifest", "board", "rest"),
+        options=stage("convert"),
         code=code("convert"),
     shell:
         "python -m vgyro.tasks.convert --input frames {input.frames} --input integrity {input.integrity}"
@@ -62,7 +62,7 @@ rule noise:
         mem_mb=1500,
         runtime=30,
     params:
-        options=stage("board", "metrics"),
+        options=stage("noise"),
         code=code("noise"),
     shell:
         "python -m vgyro.tasks.noise --input rates {input.rates:q} --output noise {output.noise}"

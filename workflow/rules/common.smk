@@ -8,7 +8,7 @@ from pathlib import Path
 from vgyro.config import override_analysis
 from vgyro.dataset import AT_REST
 from vgyro.storage.inputs import data_files
-from vgyro.tasks.closure import code_hash
+from vgyro.tasks.closure import code_hash, sections_of
 from vgyro.tasks.inputs_check import load_datasets
 from vgyro.tasks.inputs_check import reference_file as logged_reference
 from vgyro.tasks.twins import load_twins
@@ -42,8 +42,8 @@ def analysis_of(dataset):
     )
 
 
-def stage(*sections, **values):
-    """Options of a stage's jobs, as JSON: the sections that it uses, its wildcards, and what else is given.
+def stage(task, **values):
+    """Options of a task's jobs, as JSON: the SECTIONS that its module names, the wildcards, and what else is given.
 
     A function among what else is given is called with the wildcards.
     """
@@ -57,7 +57,7 @@ def stage(*sections, **values):
         record = {**given, **dict(wildcards.items()), "analysis": {}}
         if "recording" in record:
             record["kind"] = kind_of(wildcards.dataset, wildcards.recording)
-        for section in sections:
+        for section in sections_of(f"vgyro.tasks.{task}"):
             if section in ("manifest", "board"):
                 record[section] = getattr(known, section).model_dump(mode="json")
             else:

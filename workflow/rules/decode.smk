@@ -14,7 +14,7 @@ rule decode:
         runtime=60,
     params:
         files=named_files,
-        options=stage("manifest", "board", "integrity", "engine"),
+        options=stage("decode"),
         code=code("decode"),
     shell:
         "python -m vgyro.tasks.decode --input files {params.files:q} --output frames {output.frames}"
@@ -35,7 +35,7 @@ checkpoint screen:
         mem_mb=500,
         runtime=5,
     params:
-        options=stage("manifest"),
+        options=stage("screen"),
         code=code("screen"),
     shell:
         "python -m vgyro.tasks.screen --input integrity {input.integrity:q} --output screen {output.screen}"

@@ -13,7 +13,7 @@ rule faults:
         mem_mb=1500,
         runtime=30,
     params:
-        options=stage("board", "faults"),
+        options=stage("faults"),
         code=code("faults"),
     shell:
         "python -m vgyro.tasks.faults --input rates {input.rates} --input calibration {input.calibration}"
@@ -40,9 +40,7 @@ rule fuse:
         mem_mb=2500,
         runtime=60,
     params:
-        options=stage(
-            "board", "engine", "volatility", "fusion", injected_rate=injected_rate
-        ),
+        options=stage("fuse", injected_rate=injected_rate),
         code=code("fuse"),
     shell:
         "python -m vgyro.tasks.fuse --input rates {input.rates} --input noise {input.noise} --input weights {input.weights:q} --input moved {input.moved:q} --input faults {input.faults}"

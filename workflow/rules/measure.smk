@@ -20,7 +20,7 @@ rule measure:
         mem_mb=2000,
         runtime=60,
     params:
-        options=stage("board", "engine", "metrics"),
+        options=stage("measure"),
         code=code("measure"),
     shell:
         "python -m vgyro.tasks.measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods} --input moved {input.moved}"
@@ -50,9 +50,7 @@ rule crosscheck:
         mem_mb=2500,
         runtime=60,
     params:
-        options=stage(
-            "board", "engine", "volatility", "fusion", "metrics", "crosscheck"
-        ),
+        options=stage("crosscheck"),
         code=code("crosscheck"),
     shell:
         "python -m vgyro.tasks.crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input series {input.series:q} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"

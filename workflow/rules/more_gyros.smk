@@ -14,7 +14,7 @@ rule more_gyros:
         mem_mb=500,
         runtime=5,
     params:
-        options=stage("board", "fusion"),
+        options=stage("more_gyros"),
         code=code("more_gyros"),
     shell:
         "python -m vgyro.tasks.more_gyros --input rates {input.rates} --input noise {input.noise} --input correlation {input.correlation}"

@@ -17,7 +17,7 @@ rule papers_page:
         mem_mb=4000,
         runtime=20,
     params:
-        options=stage("manifest", "board", "volatility", "fusion", "metrics"),
+        options=stage("papers"),
         code=code("papers"),
     shell:
         "python -m vgyro.tasks.papers --input calibration {input.calibration} --input noise {input.noise:q}"

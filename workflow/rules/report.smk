@@ -17,17 +17,7 @@ rule report:
         mem_mb=1500,
         runtime=20,
     params:
-        options=stage(
-            "manifest",
-            "board",
-            "integrity",
-            "rest",
-            "calibration",
-            "volatility",
-            "fusion",
-            "metrics",
-            "crosscheck",
-        ),
+        options=stage("report"),
         code=code("report"),
     shell:
         "python -m vgyro.tasks.report --input calibration {input.calibration} --input screen {input.screen}"

@@ -14,7 +14,7 @@ rule simulate:
         mem_mb=3000,
         runtime=20,
     params:
-        options=stage("board"),
+        options=stage("simulate"),
         code=code("simulate"),
     shell:
         "python -m vgyro.tasks.simulate --input twin {input.twin} --output dump {output.dump} --output truth {output.truth}"

@@ -12,7 +12,7 @@ rule series:
         mem_mb=1000,
         runtime=20,
     params:
-        options=stage("board", "volatility"),
+        options=stage("series"),
         code=code("series"),
     shell:
         "python -m vgyro.tasks.series --input rates {input.rates} --output series {output.series}"
@@ -41,7 +41,7 @@ rule volatility_chunk:
         mem_mb=1000,
         runtime=480,
     params:
-        options=stage("board", "engine", "volatility", injected_rate=injected_rate),
+        options=stage("volatility_chunk", injected_rate=injected_rate),
         code=code("volatility_chunk"),
     shell:
         "python -m vgyro.tasks.volatility_chunk --input series {input.series}"
@@ -70,7 +70,7 @@ rule volatility:
         mem_mb=1500,
         runtime=480,
     params:
-        options=stage("board", "engine", "volatility", injected_rate=injected_rate),
+        options=stage("volatility", injected_rate=injected_rate),
         code=code("volatility"),
     shell:
         "python -m vgyro.tasks.volatility --input series {input.series}"
@@ -96,7 +96,7 @@ rule bekk:
         mem_mb=1000,
         runtime=60,
     params:
-        options=stage("board", "engine", "volatility", "crosscheck"),
+        options=stage("bekk"),
         code=code("bekk"),
     shell:
         "python -m vgyro.tasks.bekk --input series {input.series}"
@@ -120,7 +120,7 @@ rule effects:
         mem_mb=1500,
         runtime=60,
     params:
-        options=stage("board", "engine", "volatility", "metrics", definition="level"),
+        options=stage("effects", definition="level"),
         code=code("effects"),
     shell:
         "python -m vgyro.tasks.effects --input series {input.series} --input tones {input.tones}"
