@@ -17,6 +17,7 @@ PARTS: dict[str, str] = {
     "slow_walk": "random walks by likelihood instead of those of the noise record",
     "slow_common": "what all gyros drift together at rest goes into the deviation",
     "temperature": "slow errors that follow the temperature",
+    "warm_up": "slow errors that settle, as in a warm-up",
     "anchors": "standstill pins the common bias",
     "band": "variances of the band that passes",
     "lines": "vibrations are motion",

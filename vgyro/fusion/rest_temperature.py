@@ -12,10 +12,11 @@ import numpy as np
 
 from vgyro.fusion.array import AllanScales, ArrayRates, CannotRun, TemperatureAtRest
 from vgyro.fusion.rest_scales import own_scales
-from vgyro.fusion.slow import blocks_temperature
+from vgyro.fusion.slow import usual_arw
 from vgyro.fusion.slow_blocks import SlowBlocks
 from vgyro.fusion.slow_choice import choose
 from vgyro.fusion.slow_common import common_walk
+from vgyro.fusion.slow_followed import blocks_temperature
 from vgyro.fusion.slow_model import Constants, Evidence
 from vgyro.fusion.slow_prior import empirical_prior
 
@@ -53,7 +54,7 @@ def _constants(
     """Posterior of biases, steps and slopes; None where the slopes are not believed."""
     variance = np.tile(array.noise.arw**2 * array.rate_hz, (len(blocks), 1))
     evidence = Evidence.of(array, blocks, variance, array.noise.correlation, resting, relative, common)
-    choice = choose(evidence, blocks, array.noise.rrw, array.noise.arw, None)
+    choice = choose(evidence, blocks, array.noise.rrw, usual_arw(variance, array.period), None)
     return empirical_prior(evidence, choice.filtered).posterior(choice.filtered) if choice.slopes else None
 
 

@@ -7,23 +7,22 @@ vgyro.fusion.slow_model.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from vgyro.errors import DataError
-from vgyro.fusion.array import ArrayRates, FilterParameters, TemperatureAtRest
+from vgyro.fusion.array import ArrayRates, FilterParameters
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_choice import Choice, choose
-from vgyro.fusion.slow_common import common_note, common_walk
-from vgyro.fusion.slow_model import Constants, Evidence, Walk, root_of, with_shared_slope
+from vgyro.fusion.slow_common import common_note
+from vgyro.fusion.slow_followed import Case, Followed
+from vgyro.fusion.slow_model import Constants, Walk, root_of, with_shared_slope
 from vgyro.fusion.slow_prior import empirical_prior
 from vgyro.fusion.slow_smoother import run_smoother
 from vgyro.units import rrw_deg_h_rt_h
 
-LEAST_RANGE = 1.0
-"""Range of the temperature, K, from which the biases may be regressed on it."""
 AS_A_WHOLE = "at rest as a whole: no anchors, or its rate would be set to zero"
 
 Weights = np.ndarray | SampleWeights
@@ -100,59 +99,47 @@ def slow_errors(
     variance = np.broadcast_to(np.asarray(variance, dtype=float), (len(blocks), gyros))
     noise = array.noise.correlation if correlation is None else correlation
     resting, why = _anchors(array, parameters, blocks)
-    degrees, why_not = blocks_temperature(array, blocks)
-    if parameters.temperature == "off" or not parameters.has("temperature"):
-        degrees, why_not = None, "temperature is off" if array.temperature is not None else ""
-    centre = 0.0 if degrees is None else float(np.average(degrees, weights=blocks.length))
-    relative = None if degrees is None else degrees - centre
     if walk is None and not parameters.has("slow_walk"):
         walk = Walk(np.nan_to_num(array.noise.rrw))
-
-    def chosen(known: TemperatureAtRest | None) -> tuple[Evidence, Choice, float]:
-        scales = array.noise.scales if known is None or known.scales is None else known.scales
-        common = common_walk(scales) if parameters.has("slow_common") else 0.0
-        since = relative if known is None or relative is None else relative + (centre - known.nulled)
-        evidence = Evidence.of(array, blocks, variance, noise, resting, since, common, known)
-        return evidence, choose(evidence, blocks, array.noise.rrw, _usual_arw(variance, array), walk), common
-
-    known = None if relative is None or array.at_rest.all() else array.noise.temperature
-    evidence, choice, common = chosen(known)
-    if known is not None and not choice.slopes:
-        known = None
-        evidence, choice, common = chosen(None)
+    arw = usual_arw(variance, array.period)
+    found = Case(array, parameters, blocks, variance, noise, resting, arw, walk).followed()
+    evidence, choice = found.evidence, found.choice
     constants = empirical_prior(evidence, choice.filtered).posterior(choice.filtered)
     state, covariance = run_smoother(choice.information, choice.filtered)
-    design = evidence.design
     constant_rate = choice.slopes and bool(array.at_rest.all())
     if constant_rate:
-        so_far, _ = _with_constants(state, covariance, constants, design)
+        so_far, _ = _with_constants(state, covariance, constants, evidence.design)
         constants = with_shared_slope(evidence, choice.walk, so_far, constants)
-    bias, covariance = _with_constants(state, covariance, constants, design)
-    if known is not None and relative is not None:
-        bias = bias + np.outer(relative + (centre - known.nulled), known.slope)
-        if not evidence.anchored:
-            covariance += (known.nulled_sd * known.slope.mean()) ** 2
-    if common and not evidence.anchored:
+    bias, covariance = _with_constants(state, covariance, constants, evidence.design)
+    bias, covariance = _with_common(found, blocks, bias, covariance)
+    temperature = _slopes(found, constants) if choice.slopes and math.isnan(found.settles_s) else None
+    notes = (
+        why, found.note, _of_walk(array, choice.walk), common_note(found.common), _of_followed(found, constant_rate)
+    )  # fmt: skip
+    note = "; ".join(filter(None, notes))
+    return SlowErrors(blocks, bias, covariance, evidence.anchored, temperature, choice.walk, constants, note)
+
+
+def _with_common(
+    found: Followed, blocks: SlowBlocks, bias: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """With the slopes of the record at rest, and what no difference shows: where it was nulled, and common walks."""
+    if found.known is not None and found.regressor is not None:
+        bias = bias + np.outer(found.regressor, found.known.slope)
+        if not found.evidence.anchored:
+            covariance = covariance + (found.known.nulled_sd * found.known.slope.mean()) ** 2
+    if found.common and not found.evidence.anchored:
         # Seen in nothing, so that it grows from the start on, whether or not the gyros' own walks fade.
-        covariance += (common * (blocks.time - blocks.time[0]))[:, None, None]
-    warming = _slopes(evidence, constants, known, centre) if choice.slopes else None
-    parts = (
-        why,
-        why_not,
-        _of_walk(array, choice.walk),
-        common_note(common),
-        _of_temperature(choice, evidence, constant_rate),
-    )
-    note = "; ".join(filter(None, parts))
-    return SlowErrors(blocks, bias, covariance, evidence.anchored, warming, choice.walk, constants, note)
+        covariance = covariance + (found.common * (blocks.time - blocks.time[0]))[:, None, None]
+    return bias, covariance
 
 
-def _usual_arw(variance: np.ndarray, array: ArrayRates) -> np.ndarray:
+def usual_arw(variance: np.ndarray, period: float) -> np.ndarray:
     """ARW [N], deg/s/√Hz, of the usual variance [B, N] of each gyro's samples."""
     usable = np.where(np.isfinite(variance) & (variance > 0), variance, np.nan)
     empty = np.isnan(usable).all(axis=0)
     usable[:, empty] = 1.0
-    return np.sqrt(np.nanmedian(usable, axis=0) * array.period)
+    return np.sqrt(np.nanmedian(usable, axis=0) * period)
 
 
 def _with_constants(
@@ -181,20 +168,6 @@ def _anchors(array: ArrayRates, parameters: FilterParameters, blocks: SlowBlocks
     return resting, f"pinned to zero rate by {seconds:.4g} s of standstill; the Earth's rate there is taken for bias"
 
 
-def blocks_temperature(array: ArrayRates, blocks: SlowBlocks) -> tuple[np.ndarray | None, str]:
-    """Temperature of the blocks [B], °C, where it can be regressed on; else None and why."""
-    if array.temperature is None:
-        return None, ""
-    degrees = blocks.mean(array.temperature)
-    known = np.isfinite(degrees)
-    if not known.all():
-        return None, f"temperature unknown in {int((~known).sum())} of {len(known)} blocks: not regressed on"
-    span = float(np.ptp(degrees))
-    if span <= LEAST_RANGE:
-        return None, f"temperature within {span:.2g} K: not regressed on"
-    return degrees, ""
-
-
 def _of_walk(array: ArrayRates, walk: Walk) -> str:
     if walk.how == "given":
         unknown = np.flatnonzero(~np.isfinite(array.noise.rrw))
@@ -205,29 +178,30 @@ def _of_walk(array: ArrayRates, walk: Walk) -> str:
     return f"K = {sizes} deg/h/√h{fading}, by likelihood (2Δ log L = {walk.gain:.1f})"
 
 
-def _slopes(evidence: Evidence, constants: Constants, known: TemperatureAtRest | None, reference: float) -> Temperature:
-    slopes = slice(evidence.plain, None)
+def _slopes(found: Followed, constants: Constants) -> Temperature:
+    slopes = slice(found.evidence.plain, None)
     mean, covariance = constants.mean[slopes], constants.covariance[slopes, slopes]
-    if known is None:
-        return Temperature(mean, covariance, reference)
-    root = root_of(known.covariance)
-    return Temperature(known.slope + root @ mean, root @ covariance @ root, reference)
+    if found.known is None:
+        return Temperature(mean, covariance, found.reference)
+    root = root_of(found.known.covariance)
+    return Temperature(found.known.slope + root @ mean, root @ covariance @ root, found.reference)
 
 
-def _of_temperature(choice: Choice, evidence: Evidence, constant_rate: bool) -> str:
+def _of_followed(found: Followed, constant_rate: bool) -> str:
+    choice = found.choice
     if not np.isfinite(choice.slopes_gain):
         return ""
-    if evidence.known_slopes:
+    if found.known is not None:
         return "the temperature coefficients are those of the record at rest, and what the differences say of them"
-    anchored = evidence.anchored
     compared = f"2Δ log L = {choice.slopes_gain:.1f}, {choice.needed:.1f} needed"
+    if math.isfinite(found.settles_s):
+        return f"the biases settle, as in a warm-up, in about {found.settles_s:.3g} s ({compared})"
     if not choice.slopes:
         return f"not regressed on the temperature ({compared})"
     seen = "their common part is not"
-    if anchored or constant_rate:
-        seen = (
-            "standstill shows their common part" if anchored else "a rate that is one constant shows their common part"
-        )
+    if found.evidence.anchored or constant_rate:
+        shows = "standstill" if found.evidence.anchored else "a rate that is one constant"
+        seen = f"{shows} shows their common part"
     return f"regressed on the temperature ({compared}): differences of the slopes between gyros are seen; {seen}"
 
 

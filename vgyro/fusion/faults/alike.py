@@ -15,7 +15,8 @@ LIKE = 0.2
 """Where the others, in the middle, do so much of what a gyro does, it is the array."""
 SETTLES, EARLY = 0.1, 0.05
 """The same of their mean square for a drift that begins with a run, in so much of it: that is how gyros settle when
-they are switched on. Of six sizes by chance, the largest is ten times those of the others in one array of 2,000."""
+they are switched on. Of six sizes by chance, the largest is ten times those of the others in one array of 2,000.
+What the noise gives is not taken off: evidence too weak to show that the others do less accuses no gyro."""
 
 
 def of_the_array(one: Candidate, parts: Sequence[Slow]) -> bool:
@@ -38,8 +39,9 @@ def of_the_array(one: Candidate, parts: Sequence[Slow]) -> bool:
     if not sizes:
         return False
     settles = one.kind == "drift" and one.first - int(np.argmax(run)) < EARLY * run.sum()
-    square = float(np.mean(np.square(sizes))) if settles else spread(np.array(sizes)) ** 2
-    return square - one.evidence**-2.0 > (SETTLES if settles else LIKE) ** 2
+    if settles:
+        return float(np.mean(np.square(sizes))) > SETTLES**2
+    return spread(np.array(sizes)) ** 2 - one.evidence**-2.0 > LIKE**2
 
 
 def _form(own: Slow, first: int, last: int, run: np.ndarray) -> np.ndarray:

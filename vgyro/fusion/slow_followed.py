@@ -1,0 +1,132 @@
+"""What the biases follow beside their random walks: the temperature, or a warm-up that settles.
+
+Both are regressors with one coefficient a gyro, chosen with the walks by the likelihood (vgyro.fusion.slow_choice).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.fusion.array import ArrayRates, FilterParameters, TemperatureAtRest
+from vgyro.fusion.slow_blocks import SlowBlocks
+from vgyro.fusion.slow_choice import Choice, choose
+from vgyro.fusion.slow_common import common_walk
+from vgyro.fusion.slow_model import Evidence, Walk
+
+LEAST_RANGE = 1.0
+"""Range of the temperature, K, from which the biases may be regressed on it."""
+SETTLED = (3.0, 6.0, 12.0)
+"""A warm-up settles with the time constant of the recording over one of these."""
+DRIFTING = 4.0
+"""Units of ln(blocks) by which 2Δ log likelihood of the walks is above those of the record: then one is looked for."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The model of the biases.
+
+    regressor : [B], K or 1, what the slopes are multiplied by; None: nothing was looked for
+    reference : temperature at which it is zero, °C;  settles_s : time constant of a warm-up, s; NaN: it is none
+    known     : what a record at rest knows of the slopes, where it is used;  common : variance of a walk all share
+    note      : what was not looked for
+    """
+
+    evidence: Evidence
+    choice: Choice
+    common: float
+    regressor: np.ndarray | None = None
+    reference: float = 0.0
+    known: TemperatureAtRest | None = None
+    settles_s: float = math.nan
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One recording.
+
+    variance : [B, N] of a sample;  correlation : [N, N] of the noise;  resting : [B], blocks at rest for certain
+    arw      : [N], about;  walk : the random walks; None: they are chosen
+    """
+
+    array: ArrayRates
+    parameters: FilterParameters
+    blocks: SlowBlocks
+    variance: np.ndarray
+    correlation: np.ndarray
+    resting: np.ndarray
+    arw: np.ndarray
+    walk: Walk | None = None
+
+    def followed(self) -> Followed:
+        """The model that the likelihood prefers."""
+        degrees, why_not = blocks_temperature(self.array, self.blocks)
+        if self.array.temperature is not None and not self._may("temperature"):
+            degrees, why_not = None, "temperature is off"
+        if degrees is None:
+            return self._or_warm_up(self._fit(None, note=why_not))
+        centre = float(np.average(degrees, weights=self.blocks.length))
+        known = None if self.array.at_rest.all() else self.array.noise.temperature
+        if known is not None:
+            found = self._fit(degrees - known.nulled, known.nulled, known)
+            if found.choice.slopes:
+                return found
+        return self._fit(degrees - centre, centre)
+
+    def _may(self, part: str) -> bool:
+        return self.parameters.temperature != "off" and self.parameters.has(part)
+
+    def _fit(
+        self,
+        regressor: np.ndarray | None,
+        reference: float = 0.0,
+        known: TemperatureAtRest | None = None,
+        settles_s: float = math.nan,
+        note: str = "",
+    ) -> Followed:
+        noise = self.array.noise
+        scales = noise.scales if known is None or known.scales is None else known.scales
+        common = common_walk(scales) if self.parameters.has("slow_common") else 0.0
+        evidence = Evidence.of(
+            self.array, self.blocks, self.variance, self.correlation, self.resting, regressor, common, known
+        )
+        choice = choose(evidence, self.blocks, noise.rrw, self.arw, self.walk)
+        return Followed(evidence, choice, common, regressor, reference, known, settles_s, note)
+
+    def _or_warm_up(self, plain: Followed) -> Followed:
+        """The likeliest warm-up where the walks alone are far from those of the record, and it is likelier than they.
+
+        It costs its time constant beside the coefficients' variance: ln(blocks) each (BIC).
+        """
+        price = math.log(len(self.blocks))
+        if self.walk is not None or not self.parameters.has("warm_up") or plain.choice.walk.gain < DRIFTING * price:
+            return plain
+        best = max(self._warm_ups(), key=lambda one: one.choice.slopes_gain, default=None)
+        if best is None or not best.choice.slopes or best.choice.slopes_gain <= best.choice.needed + price:
+            return plain
+        return best
+
+    def _warm_ups(self) -> Iterator[Followed]:
+        since = self.blocks.time - self.blocks.time[0]
+        for part in SETTLED:
+            tau = float(since[-1]) / part
+            if tau > 0:
+                yield self._fit(np.exp(-since / tau), settles_s=tau)
+
+
+def blocks_temperature(array: ArrayRates, blocks: SlowBlocks) -> tuple[np.ndarray | None, str]:
+    """Temperature of the blocks [B], °C, where it can be regressed on; else None and why."""
+    if array.temperature is None:
+        return None, ""
+    degrees = blocks.mean(array.temperature)
+    known = np.isfinite(degrees)
+    if not known.all():
+        return None, f"temperature unknown in {int((~known).sum())} of {len(known)} blocks: not regressed on"
+    span = float(np.ptp(degrees))
+    if span <= LEAST_RANGE:
+        return None, f"temperature within {span:.2g} K: not regressed on"
+    return degrees, ""
