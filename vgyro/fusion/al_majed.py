@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from vgyro import engine as engines
-from vgyro.errors import DataError
 from vgyro.fusion import design
-from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, cannot_run
 
 INFERRED = (
     "the whole bank; rate: random walk; one correlation for every pair of gyros, with the measured ARW; process noises "
@@ -82,10 +81,8 @@ def _covariance(noise: ArrayNoise, correlation: float) -> np.ndarray:
 def _process_noise(noise: ArrayNoise, parameters: FilterParameters) -> float:
     if parameters.q is not None:
         return parameters.q
-    try:
+    with cannot_run():
         return design.q_for_bandwidth(design.information(noise.R), parameters.bandwidth_hz)
-    except DataError as error:
-        raise CannotRun(error.what, error.where, error.remedy) from None
 
 
 def _note(parameters: FilterParameters, q: float, last: np.ndarray, average: np.ndarray) -> str:

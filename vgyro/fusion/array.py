@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal, TypeVar
@@ -27,6 +28,17 @@ WeightKey = tuple[str, str, str]
 
 class CannotRun(DataError):
     """A method cannot run on this array; the others go on, and the reason goes into the methods table."""
+
+
+@contextmanager
+def cannot_run() -> Iterator[None]:
+    """What is a DataError in here is the reason why a method cannot run."""
+    try:
+        yield
+    except CannotRun:
+        raise
+    except DataError as reason:
+        raise CannotRun(reason.what, reason.where, reason.remedy) from None
 
 
 @dataclass(frozen=True)

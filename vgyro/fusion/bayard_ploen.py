@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from vgyro.errors import DataError
 from vgyro.fusion import design
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayRates, FilterParameters, Fused, cannot_run
 from vgyro.fusion.modes import Modes, estimate, modes, walk_factor
 from vgyro.fusion.modes import operations as operations_of_modes
 
@@ -43,10 +42,8 @@ def bayard_ploen(array: ArrayRates, parameters: FilterParameters, start_s: float
 def bias_modes(array: ArrayRates, parameters: FilterParameters) -> tuple[np.ndarray, Modes, np.ndarray]:
     """u [N]; the modes of the differences, whose output is -u'b; F [N, N], FF' = Q.  raises : as bayard_ploen"""
     noise = array.noise.with_arw(parameters.arw)
-    try:
+    with cannot_run():
         u = design.gain_direction(noise.R)
-    except DataError as error:
-        raise CannotRun(error.what, remedy=error.remedy) from None
     walk = walk_factor(noise)
     step = walk * math.sqrt(array.period)
     return u, modes(noise.R / array.period, step, -(u @ step), differences(len(u))), walk

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from vgyro.errors import DataError
 from vgyro.fusion import design
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayRates, FilterParameters, Fused, cannot_run
 from vgyro.fusion.modes import Modes, estimate, modes, walk_factor
 from vgyro.fusion.modes import operations as operations_of_modes
 
@@ -45,10 +44,8 @@ def chang_2008(array: ArrayRates, parameters: FilterParameters, start_s: float =
 def rate_modes(array: ArrayRates, parameters: FilterParameters) -> tuple[float, Modes]:
     """q, deg²/s³, and the modes of 1·w + b, whose output is w.  raises : as chang_2008"""
     noise = array.noise.with_arw(parameters.arw)
-    try:
+    with cannot_run():
         D = design.information(noise.R)
-    except DataError as error:
-        raise CannotRun(error.what, remedy=error.remedy) from None
     q = design.q_for_bandwidth(D, parameters.bandwidth_hz) if parameters.q is None else parameters.q
     gyros = len(noise.arw)
     steps = np.column_stack([walk_factor(noise), np.full(gyros, math.sqrt(q))]) * math.sqrt(array.period)

@@ -14,9 +14,8 @@ from collections.abc import Callable
 import numpy as np
 
 from vgyro import engine as engines
-from vgyro.errors import DataError
 from vgyro.fusion import design
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayRates, FilterParameters, Fused, cannot_run
 from vgyro.fusion.blocks import combined
 
 ONE_SAMPLE = "row k holds x(k+1), which Z(k) yields (eq. 14)"
@@ -95,19 +94,15 @@ def _by_stretch(array: ArrayRates, u: np.ndarray, run: Callable[[np.ndarray], np
 
 def _array_information(array: ArrayRates, parameters: FilterParameters) -> tuple[float, np.ndarray]:
     R = array.noise.with_arw(parameters.arw).R
-    try:
+    with cannot_run():
         return design.information(R), design.gain_direction(R)
-    except DataError as error:
-        raise CannotRun(error.what, remedy=error.remedy) from None
 
 
 def _process_noise(D: float, parameters: FilterParameters, tau: float) -> float:
     if parameters.q is not None:
         return parameters.q
-    try:
+    with cannot_run():
         return design.q_for_bandwidth(D, parameters.bandwidth_hz, tau)
-    except DataError as error:
-        raise CannotRun(error.what, error.where, error.remedy) from None
 
 
 def _described(rate: np.ndarray, u: np.ndarray, s: float, gain: float, period: float, note: str) -> Fused:

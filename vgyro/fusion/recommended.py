@@ -20,7 +20,7 @@ import numpy as np
 
 from vgyro.errors import DataError
 from vgyro.fusion.analysed import Analysed, analysed, shared_motion
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayRates, FilterParameters, Fused
 from vgyro.fusion.motion_models import UNLIMITED, SteadyGain, fixed_bandwidth
 from vgyro.fusion.parity_band import in_band
 from vgyro.fusion.slow import combined_without, slow_variance
@@ -62,7 +62,7 @@ def passed_hz(array: ArrayRates, parameters: FilterParameters, known: Analysed) 
         else:
             motion, colour = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz), 0.0
         return SteadyGain(motion, mean, colour).noise_bandwidth_hz() if motion.model != UNLIMITED else math.nan
-    except (DataError, CannotRun):
+    except DataError:
         # The smoother will say so.
         return math.nan
 

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from vgyro.errors import DataError
 from vgyro.fusion import design
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayRates, FilterParameters, Fused, cannot_run
 from vgyro.fusion.slow import combined_without, slow_errors
 
 
@@ -21,11 +20,9 @@ def frequency_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
     raises : CannotRun where an ARW is missing or the correlation is not positive definite
     """
     noise = array.noise.with_arw(parameters.arw)
-    try:
+    with cannot_run():
         u = design.gain_direction(noise.R)
         slow = slow_errors(array, parameters, noise.arw**2 * array.rate_hz, noise.correlation)
-    except DataError as error:
-        raise CannotRun(error.what, remedy=error.remedy) from None
     note = "; ".join(filter(None, ["weights of the white noise; the slow errors are taken out beforehand", slow.note]))
     return Fused.undelayed(combined_without(array, u, slow), u, note)
 

@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro import engine as engines
-from vgyro.errors import DataError
 from vgyro.fusion.activity import find_activity
 from vgyro.fusion.analysed import analysed, shared_motion
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused, cannot_run
 from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.conditional import conditional
 from vgyro.fusion.fixed import median
@@ -124,14 +123,12 @@ def _of_blocks(weights: SampleWeights, deviations: SampleWeights, length: int) -
 
 def smoothed(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Fused:
     """Smooth a fused rate.  raises : CannotRun where no model of the motion can be fitted"""
-    try:
+    with cannot_run():
         if parameters.in_motion:
             result = _in_motion(array, parameters, signal)
             variance = result.variance
         else:
             result, variance = _at_rest(array, parameters, signal)
-    except DataError as reason:
-        raise CannotRun(reason.what, reason.where, reason.remedy) from None
     slow, sd = signal.slow_variance, None
     if slow is not None:
         sd = np.sqrt(variance + slow, dtype=np.float32)

@@ -25,9 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
-from vgyro.errors import DataError
 from vgyro.fusion import design
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused, cannot_run
 
 INFERRED = (
     "all but that it is an EKF of several sensors; rate: integrated random walk of the configured bandwidth; biases: "
@@ -112,10 +111,8 @@ def stubberud_2008(array: ArrayRates, parameters: FilterParameters) -> Fused:
     """
     noise = array.noise.with_arw(parameters.arw)
     walk = _walk(noise.rrw)
-    try:
+    with cannot_run():
         D = design.information(noise.R)
-    except DataError as error:
-        raise CannotRun(error.what, remedy=error.remedy) from None
     bandwidth_hz = parameters.bandwidth_hz if parameters.q is None else design.bandwidth(D, parameters.q)
     q = q_for_bandwidth(D, bandwidth_hz)
     R, steps = noise.R / array.period, drive(q, array.period)
