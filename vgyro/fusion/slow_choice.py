@@ -30,6 +30,8 @@ ALIKE = 3.0
 """Factor by which the ratios of the K of the gyros differ from those that are known, one standard deviation."""
 SIGNIFICANT = 0.95
 """Another K is believed from this quantile of chi² on, with as many degrees of freedom as there are more parameters."""
+QUICK = (0.25, 1.0, 4.0)
+"""Multiples of K with which models are looked at before their walks are chosen."""
 BROAD = 100.0
 """Variance of the biases, of that found with the K that was given, while models are compared."""
 
@@ -81,6 +83,23 @@ def choose(evidence: Evidence, blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndar
     return Choice(walk, without, plain, False, gain, needed)
 
 
+def quick_gains(
+    plain: Evidence, walk: Walk, others: Sequence[Evidence], blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndarray
+) -> list[float]:
+    """2Δ log likelihood of each of `others`, which have slopes, over `plain` with `walk`, before walks are chosen.
+
+    Their K are as given, or those of `walk` where unknown, times one of QUICK.
+    """
+    search = _Search.of(plain, blocks, rrw, arw)
+    base = search.values(search.information.first_regressors(plain.plain), [walk])[0]
+    known = np.where(search.given > 0, search.given, walk.rrw)
+    found = []
+    for other in others:
+        own = _Search.of(other, blocks, rrw, arw)
+        found.append(2.0 * (max(own.values(own.information, [Walk(scale * known) for scale in QUICK])) - base))
+    return found
+
+
 @dataclass(frozen=True)
 class _Search:
     """Likelihood of the walks on some of the blocks.
@@ -121,7 +140,7 @@ class _Search:
 
         part = self.information if slopes else self.information.first_regressors(self.evidence.plain)
         walk = Walk(self.given)
-        start = self._likelihoods(part, [walk])[0]
+        start = self.values(part, [walk])[0]
         lasting, fading = self._together(part, start)
         for other, more in ((lasting, 1), (fading, 1)):
             if other.gain - walk.gain > chi2.ppf(SIGNIFICANT, more):
@@ -141,7 +160,7 @@ class _Search:
         shapes = (self.given / self.given.max(), one_size) if self.given.any() else (one_size,)
         grid = np.geomspace(*self.bounds, STARTS)
         tried = [Walk(one * shape, tau) for shape, tau, one in product(shapes, (math.inf, *self.taus), grid)]
-        values = np.reshape(self._likelihoods(part, tried), (len(shapes), -1, STARTS)).max(axis=2)
+        values = np.reshape(self.values(part, tried), (len(shapes), -1, STARTS)).max(axis=2)
         found = []
         for taus in (slice(0, 1), slice(1, None) if self.taus else slice(0, 1)):
             shape, tau = np.unravel_index(np.argmax(values[:, taus]), values[:, taus].shape)
@@ -151,7 +170,7 @@ class _Search:
         return found[0], found[1]
 
     def _of_scales(self, part: Information, shape: np.ndarray, tau_s: float, scales: np.ndarray) -> list[float]:
-        return self._likelihoods(part, [Walk(one * shape, tau_s) for one in scales])
+        return self.values(part, [Walk(one * shape, tau_s) for one in scales])
 
     def _each(self, part: Information, start: np.ndarray, tau_s: float) -> tuple[np.ndarray, float]:
         """K [N] with the highest likelihood, and its logarithm, less what holds their ratios to those of `start`.
@@ -172,7 +191,7 @@ class _Search:
         found = minimize(negative, np.log(start), jac=True, method="L-BFGS-B", bounds=limits, options=options)
         return np.exp(found.x), -float(found.fun)
 
-    def _likelihoods(self, part: Information, walks: Sequence[Walk]) -> list[float]:
+    def values(self, part: Information, walks: Sequence[Walk]) -> list[float]:
         """Log likelihoods of several walks."""
         return [self.weighed(filtered)[1] for filtered in self.evidence.filtered_with(part, walks)]
 

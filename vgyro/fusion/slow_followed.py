@@ -6,21 +6,24 @@ Both are regressors with one coefficient a gyro, chosen with the walks by the li
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from vgyro.fusion.array import ArrayRates, FilterParameters, TemperatureAtRest
 from vgyro.fusion.slow_blocks import SlowBlocks
-from vgyro.fusion.slow_choice import Choice, choose
+from vgyro.fusion.slow_choice import Choice, choose, quick_gains
 from vgyro.fusion.slow_common import common_walk
 from vgyro.fusion.slow_model import Evidence, Walk
 
 LEAST_RANGE = 1.0
 """Range of the temperature, K, from which the biases may be regressed on it."""
+FEWEST = 60
+"""Blocks from which a warm-up is looked for."""
 SETTLED = (3.0, 6.0, 12.0)
 """A warm-up settles with the time constant of the recording over one of these."""
+PROMISING = 3.0
+"""Units of ln(blocks) by which 2Δ log likelihood may be below that of the walks alone, before its own are chosen."""
 DRIFTING = 4.0
 """Units of ln(blocks) by which 2Δ log likelihood of the walks is above those of the record: then one is looked for."""
 
@@ -91,11 +94,14 @@ class Case:
         noise = self.array.noise
         scales = noise.scales if known is None or known.scales is None else known.scales
         common = common_walk(scales) if self.parameters.has("slow_common") else 0.0
-        evidence = Evidence.of(
-            self.array, self.blocks, self.variance, self.correlation, self.resting, regressor, common, known
-        )
+        evidence = self._evidence(regressor, common, known)
         choice = choose(evidence, self.blocks, noise.rrw, self.arw, self.walk)
         return Followed(evidence, choice, common, regressor, reference, known, settles_s, note)
+
+    def _evidence(self, regressor: np.ndarray | None, common: float, known: TemperatureAtRest | None) -> Evidence:
+        return Evidence.of(
+            self.array, self.blocks, self.variance, self.correlation, self.resting, regressor, common, known
+        )
 
     def _or_warm_up(self, plain: Followed) -> Followed:
         """The likeliest warm-up where the walks alone are far from those of the record, and it is likelier than they.
@@ -103,19 +109,22 @@ class Case:
         It costs its time constant beside the coefficients' variance: ln(blocks) each (BIC).
         """
         price = math.log(len(self.blocks))
-        if self.walk is not None or not self.parameters.has("warm_up") or plain.choice.walk.gain < DRIFTING * price:
+        short = len(self.blocks) < FEWEST
+        if self.walk is not None or short or not self.parameters.has("warm_up"):
             return plain
-        best = max(self._warm_ups(), key=lambda one: one.choice.slopes_gain, default=None)
-        if best is None or not best.choice.slopes or best.choice.slopes_gain <= best.choice.needed + price:
+        if plain.choice.walk.gain < DRIFTING * price:
             return plain
-        return best
-
-    def _warm_ups(self) -> Iterator[Followed]:
         since = self.blocks.time - self.blocks.time[0]
-        for part in SETTLED:
-            tau = float(since[-1]) / part
-            if tau > 0:
-                yield self._fit(np.exp(-since / tau), settles_s=tau)
+        times = [float(since[-1]) / part for part in SETTLED]
+        others = [self._evidence(np.exp(-since / tau), plain.common, None) for tau in times]
+        walk, rrw = plain.choice.walk, self.array.noise.rrw
+        gains = quick_gains(plain.evidence, walk, others, self.blocks, rrw, self.arw)
+        if max(gains) < -PROMISING * price:
+            return plain
+        tau = times[int(np.argmax(gains))]
+        found = self._fit(np.exp(-since / tau), settles_s=tau)
+        likelier = found.choice.slopes and found.choice.slopes_gain > found.choice.needed + price
+        return found if likelier else plain
 
 
 def blocks_temperature(array: ArrayRates, blocks: SlowBlocks) -> tuple[np.ndarray | None, str]:
