@@ -72,7 +72,7 @@ def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True, si
         "gyros": list(gyros),
         "arw": dict(zip(gyros, ARW, strict=False)),
         "rrw": {**dict.fromkeys(gyros, 0.001), gyros[0]: None},
-        "rrw_source": {**dict.fromkeys(gyros, "upper limit: no random walk was found"), gyros[0]: "not known"},
+        "rrw_source": {**dict.fromkeys(gyros, "upper limit"), gyros[0]: "not known"},
         "correlation": np.eye(len(gyros)).tolist(),
     }
     write_json(folder / "noise.json", record)

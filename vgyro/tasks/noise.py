@@ -32,7 +32,7 @@ from vgyro.metrics import (
 )
 from vgyro.storage.tables import write_json
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.noise_record import noise_of_record, scales_record
+from vgyro.tasks.noise_record import UPPER_LIMIT, Source, noise_of_record, scales_record
 from vgyro.tasks.noise_temperature import slopes_of_file
 from vgyro.tasks.rates_file import ArrayFile, FileColumns, has_moved, incomplete, read_frame
 
@@ -199,18 +199,18 @@ def record_of(found: ArrayNoiseRecord, gyros: list[str], axis: str, recording: s
     }
 
 
-def _usable_arw(fit: NoiseCoefficients, read: float) -> tuple[float, str]:
+def _usable_arw(fit: NoiseCoefficients, read: float) -> tuple[float, Source]:
     fitted = fit.N.value
     if math.isfinite(read) and read > 0 and (fit.N.low == 0 or not fit.reliable):
-        return read, "σ(1 s): the fitted curve does not hold"
+        return read, "read at 1 s"
     return fitted, "fitted" if math.isfinite(fitted) else "not known"
 
 
-def _usable_rrw(fit: NoiseCoefficients) -> tuple[float, str]:
+def _usable_rrw(fit: NoiseCoefficients) -> tuple[float, Source]:
     if fit.K.value > 0:
         return fit.K.value, "fitted"
     if fit.K.high > 0:
-        return fit.K.high, "upper limit: no random walk was found"
+        return fit.K.high, UPPER_LIMIT
     return fit.K.value, "none" if fit.K.value == 0 else "not known"
 
 

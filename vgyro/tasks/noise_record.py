@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from vgyro.fusion.array import AllanScales, ArrayNoise, TemperatureAtRest
 from vgyro.storage.tables import read_json
+
+Source = Literal["fitted", "read at 1 s", "upper limit", "none", "not known"]
+"""What a coefficient is: fitted; σ(1 s), where the fitted curve does not hold; the upper limit of one not found."""
+UPPER_LIMIT: Source = "upper limit"
 
 
 def read_noise(path: Path, gyros: list[str], recording: str = "") -> ArrayNoise:
@@ -23,7 +27,7 @@ def noise_of_record(record: Mapping[str, Any], gyros: list[str], recording: str 
     places = [record["gyros"].index(gyro) for gyro in gyros]
     arw, rrw = (np.array([record[name][gyro] for gyro in gyros], dtype=float) for name in ("arw", "rrw"))
     correlation = np.array(record["correlation"], dtype=float)[np.ix_(places, places)]
-    limits = [gyro for gyro in gyros if str(record["rrw_source"][gyro]).startswith("upper limit")]
+    limits = [gyro for gyro in gyros if record["rrw_source"][gyro] == UPPER_LIMIT]
     note = f"no random walk was found for {', '.join(limits)}: its upper limit stands in" if limits else ""
     own = bool(recording) and record.get("recording") == recording
     scales = scales_of_record(record, own)
