@@ -98,7 +98,10 @@ def test_a_smoother_of_another_shape_is_left_out_and_sets_no_bandwidth():
     for name in ("arw", "arw_1s"):
         assert found[4][name].note.startswith("band-limited")
         assert "the low-pass takes part" in found[4][f"if_{name}"].note
+        assert found[4][name].flags >= {"band_limited"}
+        assert found[4][f"if_{name}"].flags >= {"takes_part"}
         assert "band-limited" not in found[3]["arw"].note
+        assert not found[3]["arw"].flags & {"band_limited", "takes_part"}
     # Closed form: the noise bandwidths of the two shapes of one -3 dB bandwidth are π/2·B and π/4·B/√(√2 - 1).
     share = math.sqrt(1 / (2 * math.sqrt(math.sqrt(2) - 1)))
     assert found[3]["sigma_equal"].value / found[2]["sigma_equal"].value == pytest.approx(share, rel=0.02)

@@ -48,6 +48,7 @@ def test_white_noise_readings():
     assert "two-sided" in found["noise_density"].note
     assert found["rrw"].low == 0
     assert "not shown to exist" in found["rrw"].note
+    assert "not_shown" in found["rrw"].flags
     assert set(found) <= set(FIGURES)
 
 
@@ -61,6 +62,7 @@ def test_k_is_read_off_its_line():
     flat = rrw_read(curve_of(lambda tau: N / np.sqrt(tau)))
     assert flat.low == 0
     assert "no rise" in flat.note
+    assert flat.flags == {"upper_limit"}
 
 
 def test_bias_drift_is_the_minimum():
@@ -81,6 +83,7 @@ def test_bias_drift_is_the_minimum():
     )
     falling, _ = bias_drift(curve_of(lambda tau: N / np.sqrt(tau)))
     assert "still falls" in falling.note
+    assert falling.flags == {"upper_limit"}
 
 
 def test_average_of_white_gyros_gains_root_n():
@@ -93,7 +96,9 @@ def test_average_of_white_gyros_gains_root_n():
         assert factor.low <= math.sqrt(6) <= factor.high, name
     assert found[6]["if_sigma"].value == pytest.approx(math.sqrt(6), rel=0.01)
     assert "not significant" not in found[6]["if_arw_1s"].note
+    assert "not_significant" not in found[6]["if_arw_1s"].flags
     assert "not significant" in found[6]["if_mean"].note
+    assert "not_significant" in found[6]["if_mean"].flags
     assert "if_sigma" not in found[0]
     for row in found:
         for name, reading in row.items():
@@ -130,6 +135,7 @@ def test_factor_of_a_deviation_by_its_errors():
     assert same.high == pytest.approx(2.0)
     none = improvement_of_deviation(np.array([1.05]), 1.0, np.array([0.01, 0.02]), np.eye(2))
     assert "not significant" in none.note
+    assert none.flags == {"not_significant"}
     unknown = improvement_of_deviation(np.array([2.0]), 1.0, np.array([0.01, np.inf]), np.eye(2))
     assert math.isnan(unknown.low)
 

@@ -106,14 +106,15 @@ def metrics_table(manifest):
         ("error_mean", "error_sigma", "error_sigma_aligned", "error_sigma_scaled", "amplitude"), "deg/s"
     ) | {"delay": "s"}
     rows = [
-        (recording.name, "z", method, "", 0.0, metric, 1.0, 0.9, 1.1, unit, "")
+        (recording.name, "z", method, "", 0.0, metric, 1.0, 0.9, 1.1, unit, "", "")
         for recording in manifest.recordings
         if recording.kind != "calibration"
         for method in (*GYROS, *METHODS)
         for metric, unit in (static if recording.kind == "static" else dynamic).items()
     ]
     names = (
-        "recording", "axis", "method", "definition", "true_rate", "metric", "value", "low", "high", "unit", "note"
+        "recording", "axis", "method", "definition", "true_rate", "metric", "value", "low", "high", "unit", "note",
+        "flags",
     )  # fmt: skip
     return dict(zip(names, zip(*rows, strict=True), strict=True))
 

@@ -141,6 +141,10 @@ def _write_curves(folder: Path, level: dict[str, float]) -> None:
     write_table(folder / "spectrum.parquet", spectra, "spectrum", PROVENANCE)
 
 
+FLAGGED = {"band-limited": "band_limited", "the curve still falls": "upper_limit", "not shown": "not_shown",
+           "not significant": "not_significant"}  # fmt: skip
+
+
 def _write_metrics(
     folder: Path, recording: str, axis: str, gyros: tuple[str, ...], methods: Any, level: dict[str, float]
 ) -> None:
@@ -198,9 +202,11 @@ def _write_metrics(
     names = (
         "recording", "axis", "method", "definition", "true_rate", "metric", "value", "low", "high", "unit", "note",
     )  # fmt: skip
+    columns = {name: [row[i] for row in rows] for i, name in enumerate(names)}
+    columns["flags"] = [next((flag for note, flag in FLAGGED.items() if row[-1].startswith(note)), "") for row in rows]
     write_table(
         folder / "metrics.parquet",
-        {name: [row[i] for row in rows] for i, name in enumerate(names)},
+        columns,
         "metrics",
         PROVENANCE,
     )

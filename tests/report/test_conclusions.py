@@ -160,7 +160,7 @@ def test_what_a_smoother_of_another_shape_reads_is_never_the_best(dataset: Datas
     assert best_method(array, "if_sigma_equal").method == "average"
     table = {name: column.copy() for name, column in array.tables["metrics"].items()}
     row = (table["method"] == "average") & (table["metric"] == "if_sigma_equal")
-    table["note"] = np.where(row, "the low-pass takes part in it", table["note"]).astype(object)
+    table["flags"] = np.where(row, "takes_part", table["flags"]).astype(object)
     limited = replace(array, tables={**array.tables, "metrics": table})
     assert best_method(limited, "if_sigma_equal").method != "average"
 

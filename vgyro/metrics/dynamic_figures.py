@@ -159,5 +159,5 @@ def _factors(
             name != "if_mean",
         )
         note = f"{factor.note}; {OF_ERROR}".removeprefix("; ")
-        factors[name] = Reading(factor.value, factor.low, factor.high, note)
+        factors[name] = replace(factor, note=note)
     return factors

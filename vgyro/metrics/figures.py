@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from vgyro.figure import Figure
+from vgyro.figure import Figure, Flag
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A figure with its confidence limits (NaN where none can be given) and what to know before using it."""
+    """A figure with its confidence limits (NaN where none can be given) and what to know before using it.
+
+    flags : of FLAGS, what decides how it is used;  note : the same and more, in words
+    """
 
     value: float
     low: float
     high: float
     note: str = ""
+    flags: frozenset[Flag] = frozenset()
 
 
 def without_interpolation(sigma: Reading, gain: float) -> Reading:
@@ -26,7 +30,7 @@ def without_interpolation(sigma: Reading, gain: float) -> Reading:
     share = math.sqrt(gain)
     note = f"of samples before the interpolation that brought the gyro to the others' time, which left {gain:.3f} of it"
     joined = f"{sigma.note}; {note}" if sigma.note else note
-    return Reading(sigma.value / share, sigma.low / share, sigma.high / share, joined)
+    return replace(sigma, value=sigma.value / share, low=sigma.low / share, high=sigma.high / share, note=joined)
 
 
 FIGURES: dict[str, Figure] = {

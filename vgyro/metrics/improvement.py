@@ -28,7 +28,7 @@ def improvement_factor(
     singles_replicates [R, N], virtual_replicates [R] : the same figures of series resampled together, so that what
     the virtual gyro shares with its members does not widen the interval
     of_size : the figure is a size (1σ, ARW), not a mean: limits as in scale_limits
-    returns : Reading, limits by percentiles; note "not significant" where they hold 1
+    returns : Reading, limits by percentiles; flagged `not_significant` where they hold 1
     """
     if virtual == 0 or not math.isfinite(virtual):
         return Reading(math.nan, math.nan, math.nan, NOT_KNOWN)
@@ -42,7 +42,7 @@ def improvement_factor(
         low, high = scale_limits(value, ratios, confidence)
     else:
         low, high = (float(limit[0]) for limit in percentile_limits(ratios[:, None], confidence))
-    return Reading(value, low, high, significance(low, high))
+    return _factor(value, low, high)
 
 
 def improvement_by_draws(
@@ -70,7 +70,7 @@ def improvement_by_draws(
     tail = (1 - confidence) / 2
     above, below = np.quantile(shares, [1 - tail, tail])
     low, high = value / float(above), value / float(below)
-    return Reading(value, low, high, significance(low, high))
+    return _factor(value, low, high)
 
 
 def improvement_of_deviation(
@@ -94,12 +94,14 @@ def improvement_of_deviation(
     covariance[range(len(variance)), range(len(variance))] = variance
     error = math.sqrt(max(float(share @ covariance @ share), 0.0))
     half = math.exp(normal_quantile(confidence) * error)
-    return Reading(value, value / half, value * half, significance(value / half, value * half))
+    return _factor(value, value / half, value * half)
 
 
-def significance(low: float, high: float) -> str:
-    """What the limits of a factor say."""
-    return NOT_SIGNIFICANT if low <= 1 + ROUNDING and high >= 1 - ROUNDING else ""
+def _factor(value: float, low: float, high: float) -> Reading:
+    """A factor, flagged where its limits hold 1."""
+    if low <= 1 + ROUNDING and high >= 1 - ROUNDING:
+        return Reading(value, low, high, NOT_SIGNIFICANT, frozenset({"not_significant"}))
+    return Reading(value, low, high)
 
 
 def log_variance(reading: Reading, confidence: float = 0.95) -> float:

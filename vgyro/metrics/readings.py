@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from vgyro import units
+from vgyro.figure import Flag
 from vgyro.metrics.allan import AllanCurve, read_curve
 from vgyro.metrics.bootstrap import Units, percentile_limits, resample, scale_limits
 from vgyro.metrics.coefficients import Coefficient, NoiseCoefficients, low_pass_factor
@@ -46,11 +48,12 @@ def paper_readings(
     notes = [SMOOTHER if low_pass.other_shape else "", coefficients.note]
     density = noise_density(spectrum, flat_band(rate_hz, bandwidth_hz), curve.confidence)
     drift, drift_tau = bias_drift(curve, low_pass.shortest_tau)
+    white = _fitted(coefficients.N, units.arw_deg_rt_h, "; ".join(filter(None, notes)))
     level = Reading(density.value, density.low, density.high, _density_note(density.value, density.band))
     return {
         "noise_density": level,
         "arw_1s": _arw_at_one_second(curve, low_pass),
-        "arw": _fitted(coefficients.N, units.arw_deg_rt_h, "; ".join(filter(None, notes))),
+        "arw": replace(white, flags=white.flags | {"band_limited"}) if low_pass.other_shape else white,
         "density_ratio": density_ratio(level, coefficients.N, curve.confidence, dc_gain),
         "quantisation": _fitted(coefficients.Q, float, coefficients.note),
         "rrw_read": rrw_read(curve, low_pass.shortest_tau),
@@ -129,7 +132,8 @@ def bias_drift(curve: AllanCurve, shortest: float = 0.0) -> tuple[Reading, Readi
     note = "the curve still falls at its end: an upper limit of the floor" if falls else ""
     low, value, high = (float(units.deg_h(row[index])) for row in (curve.low, curve.deviation, curve.high))
     tau = float(curve.tau[index])
-    return Reading(value, low, high, note), Reading(tau, math.nan, math.nan, note)
+    flags: frozenset[Flag] = frozenset({"upper_limit"}) if falls else frozenset()
+    return Reading(value, low, high, note, flags), Reading(tau, math.nan, math.nan, note, flags)
 
 
 def rrw_read(curve: AllanCurve, shortest: float = 0.0) -> Reading:
@@ -154,19 +158,22 @@ def rrw_read(curve: AllanCurve, shortest: float = 0.0) -> Reading:
     value = float(units.rrw_deg_h_rt_h(value))
     low, high = _chi2_limits(value, float(weight @ edf[line]), curve.confidence)
     span = f"line through τ = {tau[line][0]:.3g} to {tau[-1]:.3g} s"
-    return Reading(value, low, high, span) if rises else Reading(value, 0.0, high, f"no rise, an upper limit; {span}")
+    if rises:
+        return Reading(value, low, high, span)
+    return Reading(value, 0.0, high, f"no rise, an upper limit; {span}", frozenset({"upper_limit"}))
 
 
 def _arw_at_one_second(curve: AllanCurve, low_pass: LowPass) -> Reading:
     value, low, high = (float(units.arw_deg_rt_h(read)) for read in read_curve(curve, 1.0))
-    note = "" if math.isfinite(value) else "the curve does not reach τ = 1 s"
+    note, limited = "" if math.isfinite(value) else "the curve does not reach τ = 1 s", low_pass.other_shape
     if low_pass.other_shape:
         note = f"{BAND_LIMITED_WORD}: {OTHER_SHAPE}, which lowers σ(1 s) by itself"
     elif low_pass.bandwidth_hz:
         kept = math.sqrt(float(low_pass_factor(np.array([1.0]), low_pass.constant, low_pass.passes)[0]))
         if kept < BAND_LIMITED:
             note = f"{BAND_LIMITED_WORD}: the filter by itself lowers σ(1 s) to {kept:.2f} of the white level"
-    return Reading(value, low, high, note)
+            limited = True
+    return Reading(value, low, high, note, frozenset({"band_limited"}) if limited else frozenset())
 
 
 def _density_note(value: float, band: tuple[float, float]) -> str:
@@ -179,6 +186,7 @@ def _fitted(coefficient: Coefficient, convert: Callable[[float], float], note: s
     value, low, high = (float(convert(number)) for number in (coefficient.value, coefficient.low, coefficient.high))
     if low == 0 and math.isfinite(high) and high > 0:
         note = f"not shown to exist: < {high:.4g}" + (f"; {note}" if note else "")
+        return Reading(value, low, high, note, frozenset({"not_shown"}))
     return Reading(value, low, high, note)
 
 

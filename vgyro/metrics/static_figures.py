@@ -23,7 +23,7 @@ from vgyro.metrics.improvement import (
     improvement_of_deviation,
     log_variance,
 )
-from vgyro.metrics.readings import BAND_LIMITED_WORD, lowest_point
+from vgyro.metrics.readings import lowest_point
 from vgyro.metrics.sampling import Sampling
 from vgyro.metrics.spectrum import Spectrum
 from vgyro.metrics.static_series import Measured, RestRecording
@@ -202,9 +202,10 @@ class _Array:
 
 def _marked(factor: Reading, reading: Reading) -> Reading:
     """A factor of a figure that a low-pass lowers by itself says so."""
-    if BAND_LIMITED_WORD not in reading.note:
+    if "band_limited" not in reading.flags:
         return factor
-    return replace(factor, note=f"{factor.note}; the low-pass takes part in it".removeprefix("; "))
+    note = f"{factor.note}; the low-pass takes part in it".removeprefix("; ")
+    return replace(factor, note=note, flags=factor.flags | {"takes_part"})
 
 
 def _cross(shared: RestRecording, measured: Sequence[Measured]) -> CrossAllan | None:

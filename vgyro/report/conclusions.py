@@ -28,7 +28,6 @@ MOST_LOST = 1e-3
 MOST_UNFITTED = 0.01
 FREE = "free"
 AT_REST_KINDS = ("static", "thermal", FREE)
-STILL_FALLS = "the curve still falls"
 BAD_RULE = (
     f"A gyro is called bad where, at rest, its 1σ or its Allan deviation at {SHORTEST_TAU:g} s or longer is more than "
     f"{BAD_FACTOR:g} times the median of its array, or its ARW read at 1 s more than {BAD_ARW_FACTOR:g} times "
@@ -232,5 +231,5 @@ def _falling(array: ArrayPart) -> list[str]:
     return [
         gyro
         for gyro in array.gyros
-        if "bias_drift" in values.get((gyro, ""), {}) and STILL_FALLS in values[gyro, ""]["bias_drift"].note
+        if "bias_drift" in values.get((gyro, ""), {}) and "upper_limit" in values[gyro, ""]["bias_drift"].flags
     ]

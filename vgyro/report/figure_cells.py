@@ -7,8 +7,6 @@ from vgyro.report.model import Value
 from vgyro.report.numbers import MISSING, significant
 from vgyro.report.tables import Cell, Column, Notes, number_cell
 
-NOT_SIGNIFICANT = "not significant"
-NOT_SHOWN = "not shown to exist"
 BAND_LIMITED = "band-limited"
 TAKES_PART = "the low-pass takes part"
 # Said of nearly every cell: a tooltip will do.
@@ -43,8 +41,8 @@ def figure_column(figure: Figure, group: str = "") -> Column:
 
 
 def says_limited(value: Value) -> bool:
-    """True if the note says that a low-pass lowers the figure by itself."""
-    return any(clause.startswith((BAND_LIMITED, TAKES_PART)) for clause in value.note.split("; "))
+    """True if a low-pass lowers the figure by itself."""
+    return bool(value.flags & {"band_limited", "takes_part"})
 
 
 def figure_cell(
@@ -53,7 +51,7 @@ def figure_cell(
     """A figure with its interval, or why there is none; factors whose interval holds 1 are grey.
 
     gyro : the row is that of a single gyro;  best : of its column
-    limited : a low-pass lowers it by itself, whether its note says so or not
+    limited : a low-pass lowers it by itself, whether it is flagged or not
     """
     if value is None:
         hint = NOT_GIVEN.get(metric, "not computed")
@@ -62,9 +60,9 @@ def figure_cell(
         return Cell("" if gyro and metric.startswith("if_") else MISSING, tone="muted", hint=hint)
     if not value.known:
         return Cell(MISSING, tone="muted", hint=value.note, notes=notes.number(value.note))
-    if value.note.startswith(NOT_SHOWN):
+    if "not_shown" in value.flags:
         return Cell(f"< {significant(value.high, 2)}", tone="muted", hint=value.note)
-    insignificant = value.note.startswith(NOT_SIGNIFICANT)
+    insignificant = "not_significant" in value.flags
     return number_cell(
         value.value,
         value.low,

@@ -29,6 +29,7 @@ class Value:
     high: float
     unit: str
     note: str
+    flags: frozenset[str] = frozenset()
 
     @property
     def known(self) -> bool:
@@ -164,8 +165,9 @@ class ArrayPart:
         moved: Values = {}
         for row in rows_of(self.tables.get("metrics", {})):
             value = Value(
-                float(row["value"]), float(row["low"]), float(row["high"]), str(row["unit"]), str(row["note"])
-            )
+                float(row["value"]), float(row["low"]), float(row["high"]), str(row["unit"]), str(row["note"]),
+                frozenset(str(row["flags"]).split()),
+            )  # fmt: skip
             found = moved if row["true_rate"] != 0 and self.kind in MOVED_KINDS else still
             found.setdefault((str(row["method"]), str(row["definition"])), {})[str(row["metric"])] = value
         return still, moved

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from vgyro.figure import FLAGS
+
 
 @dataclass(frozen=True)
 class Column:
@@ -226,7 +228,7 @@ _ALL = (
         Column("low", "1", "lower confidence limit"),
         Column("high", "1", "upper confidence limit"),
     )),
-    Schema("metrics", 2, "every figure, long", (
+    Schema("metrics", 3, "every figure, long", (
         Column("recording", "", "recording"),
         Column("axis", "", "axis of the array"),
         Column("method", "", "gyro, or name in vgyro.fusion.METHODS"),
@@ -238,6 +240,7 @@ _ALL = (
         Column("high", "see unit", "upper 95 % limit; NaN where none is given"),
         Column("unit", "", "unit of value, low and high"),
         Column("note", "", "what to know before using it"),
+        Column("flags", "", f"what decides how it is used, of: {', '.join(FLAGS)}"),
     )),
     Schema("crosscheck", 1, "sampled results computed again by an independent route", (
         Column("check", "", "what was compared"),

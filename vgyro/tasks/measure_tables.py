@@ -100,6 +100,7 @@ def metric_columns(task: Task, found: list[Rows]) -> dict[str, np.ndarray]:
         (
             task.option("recording"), task.option("axis"), one.method, one.definition, part.true_rate, name,
             row[name].value, row[name].low, row[name].high, figure.unit, row[name].note,
+            " ".join(sorted(row[name].flags)),
         )
         for part in found
         for one, row in zip(part.series, part.readings, strict=True)
@@ -107,7 +108,8 @@ def metric_columns(task: Task, found: list[Rows]) -> dict[str, np.ndarray]:
         if name in row
     ]  # fmt: skip
     names = (
-        "recording", "axis", "method", "definition", "true_rate", "metric", "value", "low", "high", "unit", "note"
+        "recording", "axis", "method", "definition", "true_rate", "metric", "value", "low", "high", "unit", "note",
+        "flags",
     )  # fmt: skip
     columns = {name: [row[index] for row in rows] for index, name in enumerate(names)}
     return {name: np.array(column, dtype=float if name in NUMBERS else str) for name, column in columns.items()}
