@@ -15,6 +15,9 @@ from vgyro.fusion.installed import fingerprint
 
 SEEDS = 8
 QUICK_REST_S, QUICK_MOTION_S = 120.0, 180.0
+QUICK_SEED = 7
+"""With the usual six gyros the common bias is about what their spread lets expect: a deviation shows if it is too wide,
+and if it is too small."""
 QUICK_METHODS = ("average", "inverse_variance_arw", "recommended_unsmoothed", "recommended")
 OURS = ("recommended_unsmoothed", "recommended")
 
@@ -50,14 +53,14 @@ def tasks(
     variants: Sequence[Sequence[str]] = ((),),
     quick: bool = False,
 ) -> list[Task]:
-    """A task a scenario.  quick : one seed, short recordings, few methods"""
+    """A task a scenario.  quick : one seed, QUICK_SEED, short recordings, few methods"""
     found, left = [], tuple(tuple(one) for one in variants)
     for name in only or names():
         scenario = load(name)
         if quick:
             scenario = scenario.shorter(QUICK_REST_S, QUICK_MOTION_S)
         chosen = tuple(methods or (QUICK_METHODS if quick else ()))
-        found.append(Task(scenario, tuple(seeds[:1] if quick else seeds), chosen, left))
+        found.append(Task(scenario, (QUICK_SEED,) if quick else tuple(seeds), chosen, left))
     return found
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
+from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.slow import slow_errors
 from vgyro.fusion.slow_model import Walk
 
@@ -77,3 +78,18 @@ def test_with_a_temperature_that_says_it_no_warm_up_is_looked_for():
     note = slow_errors(warm, MOVING, NOISE.arw**2).note
     assert "regressed on the temperature" in note
     assert "warm-up" not in note
+
+
+@pytest.mark.parametrize("follows", ["warm-up", "temperature"])
+def test_with_a_gyro_that_no_block_uses(follows):
+    """At fault throughout: its slow error is what the prior says, and the others' are as without it."""
+    array, truth = record(4, SIZES)
+    if follows == "temperature":
+        array = replace(array, temperature=40.0 - 20.0 * np.exp(-np.arange(SECONDS) / SETTLES))
+    dead = FaultEvent(2, "dead", 0, SECONDS, 99.0, np.nan, "")
+    slow = slow_errors(replace(array, faults=(dead,)), MOVING, NOISE.arw**2)
+    assert follows in slow.note
+    others = np.delete(np.arange(GYROS), 2)
+    own = (slow.bias - truth)[:, others]
+    assert (own - own.mean(axis=1)[:, None]).std() < 0.01
+    assert np.isfinite(slow.covariance).all()

@@ -141,7 +141,7 @@ class Evidence:
     def unseen(self) -> np.ndarray:
         """Rows of Filtered.squares of the gyros that no block uses: at fault throughout, or without any value."""
         gone = np.flatnonzero(~(self.weight != 0).any(axis=(0, 2)))
-        starts = [0, *([self.plain] if self.has_slopes else [])]
+        starts = [0, *([self.plain] if self.has_slopes and not self.known_slopes else [])]
         return np.concatenate([1 + start + gone for start in starts])
 
     def part(self, kept: np.ndarray) -> Evidence:
@@ -181,7 +181,8 @@ class Evidence:
                 squares[:, rows] -= squares[:, rows].mean(axis=1)[:, None]
         values, vectors = np.linalg.eigh((squares[1:, 1:] + squares[1:, 1:].T) / 2)
         squares[1:, 1:] = (vectors * np.maximum(values, 0.0)) @ vectors.T
-        squares[self.unseen] = squares[:, self.unseen] = 0.0
+        unseen = self.unseen[self.unseen < len(squares)]  # The slopes may have been left out.
+        squares[unseen] = squares[:, unseen] = 0.0
         return replace(filtered, squares=squares)
 
 
