@@ -52,3 +52,16 @@ def test_a_slow_gyro_that_drops_out(samples, found):
 def test_much_longer_than_its_values_lie_apart(longer, found):
     # Of a gyro with a value every 0.5 s a stretch counts from ten times that on.
     assert bool(dropouts(slice(2000, 2000 + 50 * longer), every=50)) == found
+
+
+@pytest.mark.parametrize(("counts", "stuck"), [(2, False), (3, True)])
+def test_where_nothing_moves_by_a_count_a_value_may_stay(counts, stuck):
+    """For two seconds the second of four gyros repeats a value; the others go to and fro between so many counts."""
+    rng, step = np.random.default_rng(3), 0.5
+    rate = step * np.rint(20.0 * np.sin(np.arange(SAMPLES) / 50.0)[:, None] + rng.standard_normal((SAMPLES, 4)))
+    still = slice(2000, 2200)
+    rate[still] = step * rng.integers(0, counts, (200, 4))
+    rate[still, 1] = 0.0
+    noise = ArrayNoise(np.full(4, 0.1), np.full(4, 0.001), np.eye(4))
+    array = ArrayRates(rate, RATE_HZ, np.zeros(SAMPLES, np.int32), np.zeros(SAMPLES, bool), noise)
+    assert [(one.gyro, one.kind) for one in find_dead(array)] == ([(1, "stuck")] if stuck else [])

@@ -62,17 +62,18 @@ def may_be_rounded(array: ArrayRates, gyro: int, start: int, stop: int) -> bool:
     """May a healthy gyro repeat one value in samples [start, stop)? It may where counts are coarser than the noise.
 
     Such gyros do not change between two counts, and one that lies near a border does; but what the board moves by some
-    counts, it must follow.
+    counts, it must follow. While the others go to and fro between two counts alone, nothing moves by one.
     """
     others = np.delete(np.arange(array.rate.shape[1]), gyro)
     if not len(others):
         return False
-    part = array.rate[start:stop][:, others]
+    part, step = array.rate[start:stop][:, others], steps(array)
+    if bool(np.median(np.ptp(part, axis=0) - step[others] * (1.0 + SAME)) <= 0.0):
+        return True
     if float(np.median(np.mean(part[1:] != part[:-1], axis=0))) >= ALIVE_CHANGES:
         return False
     together = np.median(part, axis=1)
-    step = float(steps(array)[gyro])
-    return float(np.ptp(together)) <= MOVED_STEPS * step
+    return float(np.ptp(together)) <= MOVED_STEPS * float(step[gyro])
 
 
 def _usual_difference(column: np.ndarray) -> float:
