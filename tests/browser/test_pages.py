@@ -45,7 +45,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pages")
     task = load(HERE.parent / "report" / "conftest.py").build(folder)
     report.main(task)
-    index.main(Task({"headlines": [task.output("headline")]}, {"page": folder / "reports" / "index.html"}, {}, ""))
+    page = folder / "reports" / "index.html"
+    index.main(Task({"headlines": [task.output("headline")]}, {"page": page}, {"problems": []}, ""))
     return folder / "reports"
 
 
