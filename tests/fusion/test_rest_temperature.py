@@ -82,10 +82,16 @@ def test_none_without_temperature_or_rest():
     assert temperature_at_rest(replace(array, at_rest=np.zeros(SECONDS, bool))) is None
 
 
-def test_a_common_drift_beside_the_temperature_widens_the_slopes():
-    drift = 0.03 * np.sin(2 * np.pi * np.arange(SECONDS) / 150.0)
-    alone, beside = (temperature_at_rest(record(2, slopes_of(2), common=one)[0]) for one in (None, drift))
-    assert beside.covariance.mean() > 3.0 * alone.covariance.mean()
+def test_a_common_walk_beside_the_temperature_widens_the_slopes(monkeypatch):
+    """What all drift together is seen in the Allan covariances without the temperature, and counts."""
+    walk = np.cumsum(3e-3 * np.random.default_rng(1).standard_normal(SECONDS))
+    array, true = record(1, slopes_of(1), common=walk)[0], slopes_of(1)
+    found = temperature_at_rest(array)
+    monkeypatch.setattr("vgyro.fusion.rest_temperature.common_walk", lambda _: 0.0)
+    without = temperature_at_rest(array)
+    assert found.covariance.mean() > 4.0 * without.covariance.mean()
+    assert abs((found.slope - true).mean()) < 2.0 * np.sqrt(found.covariance.mean())
+    assert abs((without.slope - true).mean()) > 2.0 * np.sqrt(without.covariance.mean())
 
 
 def test_the_allan_covariances_are_those_without_the_temperature():
@@ -141,7 +147,8 @@ def test_slopes_that_the_differences_contradict_are_not_believed(off, believed):
     wrong = true + off * sd * np.array([1, -1, 1, -1, 1, -1]) / 2
     array, _ = record(13, true, moving=True, known=known_of(wrong, sd))
     slow = slow_errors(array, MOVING, NOISE.arw**2)
-    assert ("record at rest" in slow.note) == believed
+    assert ("are those of the record at rest" in slow.note) == believed
+    assert ("contradict" in slow.note) != believed
     assert np.abs(np.diff(slow.temperature.slope - true)).max() < 1.5e-3
     if not believed:
         assert abs(slow.temperature.slope.mean()) < 0.2 * 0.01
@@ -170,3 +177,15 @@ def test_of_some_gyros():
     np.testing.assert_array_equal(some.slope, known.slope[[4, 1]])
     assert some.covariance[0, 1] == known.covariance[4, 1]
     np.testing.assert_array_equal(some.scales.covariance[:, 0, 1], known.scales.covariance[:, 4, 1])
+
+
+def test_common_drift_in_motion_is_what_the_temperature_leaves():
+    """A record that is all temperature says of no common walk, once its slopes are known."""
+    true = slopes_of(21)
+    rest = record(21, true)[0]
+    known, raw = temperature_at_rest(rest), replace(own_scales(rest), own=False)
+    array, _ = record(22, true, moving=True, known=known)
+    array = replace(array, noise=replace(array.noise, scales=raw))
+    assert "drift together" not in slow_errors(array, MOVING, NOISE.arw**2).note
+    blind = replace(array, noise=replace(array.noise, temperature=None))
+    assert "drift together" in slow_errors(blind, MOVING, NOISE.arw**2).note

@@ -93,3 +93,37 @@ def test_with_a_gyro_that_no_block_uses(follows):
     own = (slow.bias - truth)[:, others]
     assert (own - own.mean(axis=1)[:, None]).std() < 0.01
     assert np.isfinite(slow.covariance).all()
+
+
+def test_a_healthy_array_costs_no_look_for_a_warm_up(monkeypatch):
+    monkeypatch.setattr("vgyro.fusion.slow_followed.quick_gains", None)
+    slow_errors(record(1, 0.0 * SIZES)[0], MOVING, NOISE.arw**2)
+    with pytest.raises(TypeError):
+        slow_errors(record(1, SIZES)[0], MOVING, NOISE.arw**2)
+
+
+@pytest.mark.parametrize(("over", "found"), [(-0.1, False), (0.1, True)])
+def test_a_warm_up_costs_its_time_constant(monkeypatch, over, found):
+    """2Δ log L of ln(blocks) more than the coefficients alone cost.  over : that, in units of log L"""
+    from vgyro.fusion import slow_followed
+
+    real = slow_followed.choose
+
+    def near(evidence, *arguments):
+        choice = real(evidence, *arguments)
+        gain = choice.needed + np.log(SECONDS) + over
+        return replace(choice, slopes_gain=gain) if evidence.has_slopes else choice
+
+    monkeypatch.setattr(slow_followed, "choose", near)
+    assert ("warm-up" in slow_errors(record(1, SIZES)[0], MOVING, NOISE.arw**2).note) == found
+
+
+def test_at_rest_the_slopes_common_part_is_not_drawn_to_zero():
+    """The spread of the slopes says nothing of their mean, which a constant rate shows: .01 deg/s/K, ± .0001 of four."""
+    slopes = 0.01 + 1e-3 * np.array([1, -1, 2, -2, 1.5, -1.5])
+    degrees, found = 25.0 + 30.0 * np.linspace(-0.5, 0.5, SECONDS), []
+    for seed in range(4):
+        array, _ = record(seed, 0.0 * SIZES, still=True)
+        warm = replace(array, rate=array.rate + np.outer(degrees - 25.0, slopes), temperature=degrees)
+        found.append(slow_errors(warm, FilterParameters(), NOISE.arw**2).temperature.slope.mean())
+    assert np.mean(found) == pytest.approx(0.01, abs=0.0004)

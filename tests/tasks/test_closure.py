@@ -82,6 +82,16 @@ def test_what_a_task_asks_for_it_names(task: str) -> None:
     assert declared <= {"manifest", "board", *Analysis.model_fields}
 
 
+@pytest.mark.parametrize("task", sorted({*EVERY} - {"report"}))  # The page shows all of them.
+def test_what_a_task_names_is_asked_for(task: str) -> None:
+    """By its module or another that it reaches: a section that nobody reads would re-run it for nothing."""
+    modules = (name for name in closure.import_closure(f"vgyro.tasks.{task}") if name.startswith("vgyro.tasks."))
+    sources = [closure._source(name).read_text(encoding="utf-8") for name in modules]
+    for section in closure.sections_of(f"vgyro.tasks.{task}"):
+        asked = "task.engine" if section == "engine" else f'task.section("{section}"'
+        assert any(asked in source for source in sources), section
+
+
 def test_a_module_that_names_no_sections() -> None:
     with pytest.raises(ValueError, match=r"vgyro\.tasks\.common names no SECTIONS"):
         closure.sections_of("vgyro.tasks.common")

@@ -16,6 +16,7 @@ from vgyro.fusion.slow_choice import Choice, choose, quick_gains
 from vgyro.fusion.slow_common import common_walk
 from vgyro.fusion.slow_model import Evidence, Walk
 
+CONTRADICTED = "the differences contradict the temperature coefficients of the record at rest: these are not used"
 LEAST_RANGE = 1.0
 """Range of the temperature, K, from which the biases may be regressed on it."""
 FEWEST = 60
@@ -35,7 +36,7 @@ class Followed:
     regressor : [B], K or 1, what the slopes are multiplied by; None: nothing was looked for
     reference : temperature at which it is zero, °C;  settles_s : time constant of a warm-up, s; NaN: it is none
     known     : what a record at rest knows of the slopes, where it is used;  common : variance of a walk all share
-    note      : what was not looked for
+    note      : what was not looked for, or not believed
     """
 
     evidence: Evidence
@@ -68,7 +69,8 @@ class Case:
     def followed(self) -> Followed:
         """The model that the likelihood prefers."""
         degrees, why_not = blocks_temperature(self.array, self.blocks)
-        if self.array.temperature is not None and not self._may("temperature"):
+        off = self.parameters.temperature == "off" or not self.parameters.has("temperature")
+        if self.array.temperature is not None and off:
             degrees, why_not = None, "temperature is off"
         if degrees is None:
             return self._or_warm_up(self._fit(None, note=why_not))
@@ -78,10 +80,8 @@ class Case:
             found = self._fit(degrees - known.nulled, known.nulled, known)
             if found.choice.slopes:
                 return found
+            return self._fit(degrees - centre, centre, note=CONTRADICTED)
         return self._fit(degrees - centre, centre)
-
-    def _may(self, part: str) -> bool:
-        return self.parameters.temperature != "off" and self.parameters.has(part)
 
     def _fit(
         self,
@@ -110,9 +110,8 @@ class Case:
         """
         price = math.log(len(self.blocks))
         short = len(self.blocks) < FEWEST
-        if self.walk is not None or short or not self.parameters.has("warm_up"):
-            return plain
-        if plain.choice.walk.gain < DRIFTING * price:
+        steady = plain.choice.walk.gain < DRIFTING * price
+        if self.walk is not None or short or steady or not self.parameters.has("warm_up"):
             return plain
         since = self.blocks.time - self.blocks.time[0]
         times = [float(since[-1]) / part for part in SETTLED]

@@ -88,7 +88,8 @@ class Evidence:
 
         variance    : [B, N], (deg/s)² of a sample; not finite or not above 0: the gyro says nothing in this block
         correlation : [N, N] of the noise;  resting : [B] of bool, the board stands still for certain
-        temperature : [B], K, about its mean; None: no slopes;  common : variance of a walk that all share
+        temperature : [B], K about a reference, or another regressor; None: no slopes
+        common      : variance of a walk that all share
         slopes      : those of a record at rest; None: nothing is known of them
         """
         used = np.isfinite(variance) & (variance > 0) & ~blocks.at_fault(array)

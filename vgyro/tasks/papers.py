@@ -17,7 +17,7 @@ from vgyro.tasks.papers_evidence import gather
 from vgyro.tasks.papers_page import paper_page
 from vgyro.tasks.papers_plots import figures
 
-SECTIONS = ("manifest", "board", "volatility", "fusion", "metrics")
+SECTIONS = ("manifest", "board", "volatility", "metrics")
 
 
 def main(task: Task) -> None:
