@@ -119,7 +119,7 @@ def test_a_warm_up_costs_its_time_constant(monkeypatch, over, found):
 
 
 def test_at_rest_the_slopes_common_part_is_not_drawn_to_zero():
-    """The spread of the slopes says nothing of their mean, which a constant rate shows: .01 deg/s/K, ± .0001 of four."""
+    """The spread of the slopes says nothing of their mean, which a constant rate shows: .01 deg/s/K ± .0001."""
     slopes = 0.01 + 1e-3 * np.array([1, -1, 2, -2, 1.5, -1.5])
     degrees, found = 25.0 + 30.0 * np.linspace(-0.5, 0.5, SECONDS), []
     for seed in range(4):

@@ -8,99 +8,27 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from task_options import complete
+from fuse_bench import (
+    ANALYSIS,
+    ARW,
+    DEFINITIONS,
+    FULL,
+    GYROS,
+    INJECTED,
+    RATE_HZ,
+    SECONDS,
+    fuse_in,
+    fuse_moved,
+    run_volatility,
+    task_of,
+    write_inputs,
+    write_weights,
+)
 
 from vgyro.engine import ENGINES
 from vgyro.fusion import METHODS, Fused, Method, blocks
-from vgyro.storage.tables import Provenance, TableWriter, read_columns, read_metadata, write_json, write_table
-from vgyro.tasks import crosscheck, fuse, fusion_inputs, series, volatility
-from vgyro.tasks.common import Task
-
-GYROS = ("g1", "g2", "g3")
-RATE_HZ, SECONDS = 10.0, 400
-DEFINITIONS = ("level", "residual")
-ARW = (0.05, 0.05, 0.15)
-BIAS = (0.02, -0.01, 0.01)
-INJECTED = 0.05
-OUTPUTS = {name: f"{name}.parquet" for name in ("fused", "methods", "moved")}
-ANALYSIS = {
-    "volatility": {"window": 120, "step": 40, "definitions": DEFINITIONS},
-    "fusion": {"moment_window_s": 60},
-    "crosscheck": {"windows": 2},
-}
-
-
-def board(gyros):
-    fields = [{"name": gyro, "type": "i16", "at": 2 + 2 * index} for index, gyro in enumerate(gyros)]
-    frame = {"kind": "binary", "sync": "EB90", "length": 20, "fields": fields, "checksum": {"family": "none"}}
-    rows = [{"name": gyro, "field": gyro, "axis": "z", "scale": 0.01} for gyro in gyros]
-    return {"name": "small", "title": "small", "rate_hz": RATE_HZ, "frame": frame, "gyros": rows}
-
-
-def task_of(folder, inputs, outputs, gyros=GYROS, kind="static", analysis=ANALYSIS, **options):
-    options = {
-        "board": board(gyros),
-        "axis": "z",
-        "recording": "r",
-        "kind": kind,
-        "injected_rate": None,
-        "analysis": complete(analysis),
-        **options,
-    }
-    return Task(
-        {name: [folder / path for path in paths] for name, paths in inputs.items()},
-        {name: folder / path for name, path in outputs.items()},
-        json.loads(json.dumps(options)),
-        "code",
-    )
-
-
-def write_inputs(folder, gyros=GYROS, seconds=SECONDS, motion=0.0, rest=True, single=False, turning=0.0):
-    """Rates of white gyros, the third three times as noisy; a gap after 3/4; their noise record."""
-    samples = int(seconds * RATE_HZ)
-    time = np.arange(samples) / RATE_HZ
-    segment = np.where(np.arange(samples) < 3 * samples // 4, 0, 1).astype(np.int32)
-    time = time + 5.0 * segment
-    white = np.random.default_rng(7).standard_normal((samples, len(gyros))) * ARW[: len(gyros)] * np.sqrt(RATE_HZ)
-    rate = (white + BIAS[: len(gyros)] + turning + motion * np.sin(time)[:, None]).astype(
-        np.float32 if single else float
-    )
-    columns = {"time": time, "segment": segment, "at_rest": np.full(samples, rest)}
-    columns |= {gyro: rate[:, index] for index, gyro in enumerate(gyros)}
-    write_table(folder / "rates.parquet", columns, "rates", Provenance({}, "", ""), {"rate_hz": RATE_HZ})
-    record = {
-        "gyros": list(gyros),
-        "arw": dict(zip(gyros, ARW, strict=False)),
-        "rrw": {**dict.fromkeys(gyros, 0.001), gyros[0]: None},
-        "rrw_source": {**dict.fromkeys(gyros, "upper limit"), gyros[0]: "not known"},
-        "correlation": np.eye(len(gyros)).tolist(),
-    }
-    write_json(folder / "noise.json", record)
-    return rate, segment
-
-
-def run_volatility(folder):
-    series.main(task_of(folder, {"rates": ["rates.parquet"]}, {"series": "series.parquet"}))
-    for definition in (*DEFINITIONS, "moved"):
-        made = {name: f"{definition}/{name}.parquet" for name in ("garch", "dcc", "arch_lm", "weights", "fits")}
-        (folder / definition).mkdir(exist_ok=True)
-        options = {"definition": definition, "injected_rate": INJECTED if definition == "moved" else None}
-        volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, **options))
-
-
-def fuse_in(folder, tables=(), read=True, moved=(), **keywords):
-    inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "weights": list(tables), "moved": list(moved)}
-    fuse.main(task_of(folder, inputs, OUTPUTS, **keywords))
-    return [read_columns(folder / name) for name in ("fused.parquet", "methods.parquet") if read]
-
-
-@pytest.fixture(scope="module")
-def analysed(tmp_path_factory):
-    """A static recording with everything that the volatility tasks write."""
-    folder = tmp_path_factory.mktemp("analysed")
-    write_inputs(folder)
-    run_volatility(folder)
-    return folder
+from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_table
+from vgyro.tasks import crosscheck, fuse, fusion_inputs
 
 
 def test_every_method_has_its_row_and_column(analysed):
@@ -134,22 +62,6 @@ def test_weights_reach_the_samples_of_their_block(analysed):
         np.testing.assert_allclose(fused["dcc_in_sample[level]"][inside], expected, atol=1e-12)
 
 
-FULL = {**ANALYSIS, "volatility": {"rate_hz": "full"}}
-
-
-def write_weights(path, time, names, row_group):
-    """Random weights of every sample at `time`, as the volatility stage writes them; returned by model and mode."""
-    rng = np.random.default_rng(3)
-    found = {name: rng.dirichlet(np.ones(len(GYROS)), len(time)) for name in names}
-    extra = {"blocks": [list(name) for name in names], "samples": len(time)}
-    with TableWriter(path, "weights", Provenance({}, "", ""), extra, row_group=row_group) as writer:
-        for name, weights in found.items():
-            sigma = np.full(len(time), np.nan if name[1] == "causal" else 0.1, dtype=np.float32)
-            columns = {"time": time, "sigma": sigma, "status": np.full(len(time), f"status of {name[1]}")}
-            writer.append({**columns, **{f"w_{gyro}": weights[:, place] for place, gyro in enumerate(GYROS)}})
-    return found
-
-
 def test_weights_of_single_samples(tmp_path, monkeypatch):
     # The series is at the full rate and lacks some samples; row groups, pieces and blocks all end at different places.
     # Expected: the weights of the row with the sample's time, equal ones where there is none.
@@ -169,89 +81,6 @@ def test_weights_of_single_samples(tmp_path, monkeypatch):
     notes = {(m, d): n for m, d, n in zip(methods["method"], methods["definition"], methods["note"], strict=True)}
     assert notes["dcc_causal", "level"] == "status of causal."
     assert f"{1 - there.mean():.1%} of the samples" in notes["dcc_in_sample", "level"]
-
-
-def fuse_moved(folder, **keywords):
-    tables = [f"{name}/weights.parquet" for name in DEFINITIONS]
-    fused, methods = fuse_in(folder, tables, moved=["moved/weights.parquet"], **keywords)
-    return fused, methods, read_columns(folder / "moved.parquet")
-
-
-def test_moved_is_another_recording_that_turns(analysed, tmp_path):
-    # Expected: the same gyros, recorded while they turn, through all of series, volatility and fuse, to the depth to
-    # which optima are found.
-    turning = tmp_path / "turning"
-    turning.mkdir()
-    write_inputs(turning, turning=INJECTED)
-    run_volatility(turning)
-    fused, methods, moved = fuse_moved(analysed, injected_rate=INJECTED)
-    expected = fuse_in(turning, [f"{name}/weights.parquet" for name in DEFINITIONS])[0]
-    answering = [f"{model}_{mode}[level]" for model in ("ccc", "dcc") for mode in ("in_sample", "causal")]
-    answering = ["rolling_moment", "ewma_causal", "ewma_two_sided", "jiang_markov", *answering]
-    assert set(moved) == {"time", "segment", *answering}
-    for name in answering:
-        np.testing.assert_allclose(moved[name], expected[name] - INJECTED, atol=1e-4, err_msg=name)
-    said = dict(zip(methods["column"], methods["moved"], strict=True))
-    for column in fused:
-        if column in ("time", "segment", "sd_recommended", *answering):
-            continue
-        assert said[column].startswith("the same at any constant rate: "), column
-        # What is said to be the same is the same in the recording that turns.
-        np.testing.assert_allclose(fused[column], expected[column] - INJECTED, atol=1e-4, err_msg=column)
-    assert {name: said[name] for name in answering} == {name: name for name in answering}
-    assert said[""] == ""  # of the method that could not run
-    # The rate does something to each of these (of the level it shrinks: tests/fusion/test_constant_rate.py).
-    for name in answering:
-        assert np.abs(moved[name] - fused[name]).max() > 1e-5, name
-    about = read_metadata(analysed / "moved.parquet")
-    assert about["injected_rate"] == INJECTED
-    assert about["rate_hz"] == RATE_HZ
-
-
-@pytest.mark.parametrize(
-    ("keywords", "reason"),
-    [({"kind": "constant", "injected_rate": INJECTED}, "not one at rest"), ({"injected_rate": None}, "null")],
-)
-def test_no_rate_is_added(analysed, keywords, reason):
-    fused, methods, moved = fuse_moved(analysed, **keywords)
-    assert list(moved) == ["time", "segment"]
-    assert len(moved["time"]) == len(fused["time"])
-    said = dict(zip(methods["column"], methods["moved"], strict=True))
-    assert said["average"].startswith("the same at any constant rate")
-    assert said["dcc_causal[level]"].startswith("not known: ")
-    assert reason in said["dcc_causal[level]"]
-
-
-def test_level_weights_of_single_samples_are_not_estimated_again(tmp_path):
-    write_inputs(tmp_path)
-    time = read_columns(tmp_path / "rates.parquet")["time"]
-    (tmp_path / "level").mkdir()
-    write_weights(tmp_path / "level/weights.parquet", time, [("dcc", "in_sample")], row_group=4000)
-    _, methods = fuse_in(tmp_path, ["level/weights.parquet"], analysis=FULL, injected_rate=INJECTED)
-    said = dict(zip(methods["column"], methods["moved"], strict=True))
-    assert said["dcc_in_sample[level]"] == f"not known: {fusion_inputs.NOT_AT_FULL_RATE}."
-    assert said["ewma_causal"] == "ewma_causal"
-
-
-def test_a_response_that_is_not_declared_is_measured(analysed, monkeypatch):
-    # A mean of three samples, the last one of them its own: 1 sample late.
-    def smooth(array, parameters):  # noqa: ARG001
-        mean = np.pad(array.rate.mean(axis=1), (2, 0), mode="edge")
-        return Fused((mean[2:] + mean[1:-1] + mean[:-2]) / 3)
-
-    monkeypatch.setitem(METHODS, "smooth", Method("smooth", "Smooth", "test", True, (), smooth))
-    _, methods, moved = fuse_moved(analysed, injected_rate=INJECTED)
-    row = list(methods["method"]).index("smooth")
-    figures = {name: methods[name][row] for name in ("response", "dc_gain", "delay_s", "moved")}
-    assert figures["response"] == "measured"
-    assert figures["dc_gain"] == pytest.approx(1.0)
-    assert figures["delay_s"] == pytest.approx(1 / RATE_HZ, rel=1e-3)
-    assert figures["moved"] == "smooth"
-    assert moved["smooth"].std() > 0
-    ran = methods["column"] != ""
-    assert np.isfinite(methods["dc_gain"][ran]).all()
-    assert set(methods["response"][ran]) == {"analytic", "measured"}
-    assert set(methods["response"][~ran]) == {""}
 
 
 def test_both_engines_fuse_alike(analysed):

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 from task_chain import Chain, white
+from task_options import complete
 
 from vgyro.metrics import Sampling, allan_scales
 from vgyro.tasks import convert, noise
@@ -76,3 +77,17 @@ def test_the_temperature_coefficients(tmp_path):
     assert found.scales.tau[0] == 1.0
     assert read_noise(tmp_path / "noise.json", list(GYROS), record["recording"]).temperature is None
     assert "temperature" not in noise_record(tmp_path, white(30, 3)).noise()
+
+
+def test_the_engine_is_the_one_that_is_asked_for(tmp_path, monkeypatch):
+    chain = noise_record(tmp_path, white(30, 3))
+    asked = []
+    real = noise.allan_deviation
+
+    def watched(rate, rate_hz, taus, most, confidence, engine, *more, **named):
+        asked.append(engine)
+        return real(rate, rate_hz, taus, most, confidence, engine, *more, **named)
+
+    monkeypatch.setattr(noise, "allan_deviation", watched)
+    chain.run(noise, {"rates": "rates.parquet"}, ("noise.json",), analysis=complete({"engine": "reference"}))
+    assert asked == ["reference"] * 3
