@@ -56,7 +56,9 @@ def results(seeds, changes=None, volatility=NO_DCC, still=False, names=None, **p
             found.add("known weights", error_sd(one, known_weights(one)[0]))
             continue
         found.add("average + KF", error_sd(one, average_kf(one)))
-        found.add("oracle", error_sd(one, oracle(one)))
+        known = oracle(one)
+        found.add("oracle", error_sd(one, known.rate))
+        found.nees.setdefault("oracle", []).append(float(np.mean((known.rate - one.truth) ** 2 / known.variance)))
         found.add("wiener", wiener_sd(one, 7.0, 0.5))
     return found
 
@@ -105,10 +107,22 @@ def test_no_other_row_is_better_in_motion(moving):
 
 
 @pytest.mark.full
+@pytest.mark.xfail(
+    strict=True,
+    reason="0.918 (0.870-0.965); of the oracle, who knows every variance, 0.934: the twin's motion ends at its "
+    "bandwidth, that of two oscillators fades out above it, and the stated variance counts what is not there",
+)
 def test_the_posterior_deviation_is_honest(moving):
+    assert mean_of(moving.nees[OURS]).low >= 0.9, str(mean_of(moving.nees[OURS]))
+
+
+@pytest.mark.full
+def test_the_posterior_deviation_is_as_honest_as_the_oracles(moving):
     nees = mean_of(moving.nees[OURS])
-    assert nees.low >= 0.9, str(nees)
     assert nees.high <= 1.15, str(nees)
+    ratio = ratio_of(moving.nees[OURS], moving.nees["oracle"])
+    assert ratio.low >= 0.95, str(ratio)
+    assert ratio.high <= 1.05, str(ratio)
 
 
 @pytest.mark.full

@@ -10,6 +10,8 @@ from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter, ss2tf
 
+from vgyro.fusion.smoother import Smoothed, choose_motion, smooth
+
 SETTLED = 400
 """Samples left out of the likelihood, while the filter forgets its start."""
 
@@ -109,14 +111,11 @@ def known_weights(one: Case) -> tuple[np.ndarray, np.ndarray]:
     return ((one.array.rate - one.bias) * inverse).sum(axis=1) * r, r
 
 
-def oracle(one: Case) -> np.ndarray:
-    """Smoothed by one who knows the variance of every sample and the bias of every gyro; motion by likelihood [T]."""
-    from vgyro.fusion.smoother import choose_motion, smooth
-
+def oracle(one: Case) -> Smoothed:
+    """Smoothed by one who knows the variance of every sample and the bias of every gyro; motion by likelihood."""
     z, r = known_weights(one)
     rate_hz, segment = one.array.rate_hz, one.array.segment
-    motion = choose_motion(z, r, segment, rate_hz, models=one.parameters.motion_models)
-    return smooth(z, r, segment, rate_hz, motion).rate
+    return smooth(z, r, segment, rate_hz, choose_motion(z, r, segment, rate_hz, models=one.parameters.motion_models))
 
 
 def wiener_sd(one: Case, motion_sd: float, bandwidth_hz: float) -> float:
