@@ -14,10 +14,10 @@ from benchmarks.contest import Accuracy, Contest, Rival, Side
 from benchmarks.limits import arithmetic
 from vgyro.board import Board
 from vgyro.config import IntegrityOptions
-from vgyro.simulate.encode import encode
-from vgyro.simulate.line import damage
+from vgyro.simulate.serial.encode import encode
+from vgyro.simulate.serial.line import damage
 from vgyro.simulate.twin import LineDamage
-from vgyro.storage.dumps import DumpReader
+from vgyro.storage.dumps.reader import DumpReader
 from vgyro.storage.inputs import read_board
 
 BOARDS = Path(__file__).resolve().parents[1] / "config" / "boards"

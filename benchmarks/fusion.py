@@ -11,8 +11,8 @@ from benchmarks.contest import Accuracy, Contest, Rival, Side
 from benchmarks.limits import arithmetic
 from benchmarks.series import GYROS
 from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters, Method, SampleWeights
-from vgyro.fusion.array import CannotRun
 from vgyro.fusion.events import FaultEvent
+from vgyro.fusion.types import CannotRun
 
 RATE_HZ, ARW, RRW, CORRELATION = 200.0, 0.1, 1e-3, 0.1
 MOTION_DEG_S, MOTION_HZ = 20.0, 0.5

@@ -18,7 +18,7 @@ from vgyro.log import TextForm
 from vgyro.storage import open_recording
 from vgyro.storage.logs.text import open_log
 from vgyro.storage.tables import Provenance
-from vgyro.tasks.decode import decode
+from vgyro.tasks.rates.decode import decode
 
 GYROS = 6
 NAMES = ("t", *(f"g{gyro}" for gyro in range(1, GYROS + 1)))

@@ -32,9 +32,9 @@ from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, Fused, Method
 from vgyro.fusion.faults import search_faults
 from vgyro.fusion.registry import run_methods, select
 from vgyro.metrics import Sampling
-from vgyro.tasks.noise import noise_at_rest, record_of
-from vgyro.tasks.noise_record import noise_of_record
-from vgyro.tasks.rates_file import FileColumns
+from vgyro.tasks.fusion.noise import noise_at_rest, record_of
+from vgyro.tasks.fusion.noise_record import noise_of_record
+from vgyro.tasks.rates.rates_file import FileColumns
 
 SHARED_DATA = "VGYRO_SHARED_DATA"
 ABSENT = 3

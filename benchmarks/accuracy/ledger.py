@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from vgyro.fusion.array import ArrayRates
+from vgyro.fusion.types import ArrayRates
 
 T = TypeVar("T")
 Key = tuple[int, Hashable]

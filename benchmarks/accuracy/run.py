@@ -24,16 +24,16 @@ from benchmarks.accuracy.trial import Recording, Trial
 from vgyro.calibration import find_rest
 from vgyro.config import FaultOptions, FusionOptions, MetricsOptions, RestOptions
 from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters, Method, Outcome
-from vgyro.fusion.array import TemperatureAtRest
+from vgyro.fusion.bias.rest_temperature import temperature_at_rest
 from vgyro.fusion.faults import search_faults
-from vgyro.fusion.missing import fill_missing
 from vgyro.fusion.registry import run_methods, select
-from vgyro.fusion.rest_temperature import temperature_at_rest
+from vgyro.fusion.samples.missing import fill_missing
+from vgyro.fusion.types import TemperatureAtRest
 from vgyro.metrics import Sampling
-from vgyro.tasks.fusion_inputs import in_motion
-from vgyro.tasks.noise import noise_at_rest, noise_in_motion, record_of
-from vgyro.tasks.noise_record import noise_of_record
-from vgyro.tasks.rates_file import ArrayFile, FileColumns
+from vgyro.tasks.fusion.array_inputs import in_motion
+from vgyro.tasks.fusion.noise import noise_at_rest, noise_in_motion, record_of
+from vgyro.tasks.fusion.noise_record import noise_of_record
+from vgyro.tasks.rates.rates_file import ArrayFile, FileColumns
 
 Row = dict[str, Any]
 NO_WEIGHTS = "no weights of DCC or CCC are fitted here"
@@ -100,7 +100,7 @@ def _unknown(gyros: int) -> ArrayNoise:
 
 
 def _noise(trial: Trial) -> ArrayNoise:
-    """The noise record as vgyro.tasks.noise makes it: from the rest recording, else from differences in motion."""
+    """The noise record as vgyro.tasks.fusion.noise makes it: of the rest recording, else of differences in motion."""
     recording = trial.motion if trial.rest is None else trial.rest
     rate = recording.rate.copy(order="F")
     fill_missing(rate, recording.rate_hz)

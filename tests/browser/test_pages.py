@@ -10,8 +10,8 @@ from types import ModuleType
 
 import pytest
 
-from vgyro.tasks import index, report
 from vgyro.tasks.common import Task
+from vgyro.tasks.pages import index, report
 
 pytestmark = pytest.mark.browser
 HERE = Path(__file__).parent

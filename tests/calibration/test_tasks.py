@@ -11,8 +11,9 @@ from vgyro.dataset import Manifest
 from vgyro.errors import DataError
 from vgyro.simulate import manifest_of, parse_twin, simulate_recording
 from vgyro.storage.tables import Provenance, read_columns, read_json, read_metadata, write_json, write_table
-from vgyro.tasks import calibrate, convert
+from vgyro.tasks.calibration import calibrate
 from vgyro.tasks.common import Task
+from vgyro.tasks.rates import convert
 
 NOWHERE = Provenance({}, "", "")
 RATE_HZ = 200.0

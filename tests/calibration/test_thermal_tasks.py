@@ -28,9 +28,10 @@ from vgyro.storage.tables import (
     write_json,
     write_table,
 )
-from vgyro.tasks import calibrate, convert
-from vgyro.tasks.calibrate import KINDS
+from vgyro.tasks.calibration import calibrate
+from vgyro.tasks.calibration.calibrate import KINDS
 from vgyro.tasks.common import Task
+from vgyro.tasks.rates import convert
 
 NOWHERE = Provenance({}, "", "")
 RATE_HZ = 25.0  # the density of the noise is that of 200 Hz

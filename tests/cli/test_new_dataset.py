@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from vgyro.cli.manifest_text import RecordingDraft, manifest_text
+from vgyro.cli.drafts.manifest_text import RecordingDraft, manifest_text
 from vgyro.cli.new_dataset import KINDS
 from vgyro.dataset import Kind, Manifest, Recording, parse_manifest
 from vgyro.log import Log, LogGyro

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import ArrayNoise, ArrayRates
-from vgyro.fusion.array import AllanScales
+from vgyro.fusion.types import AllanScales
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.fusion import METHODS, FilterParameters, SampleWeights, block_of_sample, blocks, fixed
+from vgyro.fusion import METHODS, FilterParameters, SampleWeights, block_of_sample, blocks
+from vgyro.fusion.baselines import fixed
 from vgyro.fusion.blocks import combined, cut
 
 

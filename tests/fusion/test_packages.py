@@ -200,7 +200,7 @@ def test_a_package_that_reads_the_registry_while_it_is_loaded(root, tmp_path):
 
 HASHES = """
     from vgyro.tasks.closure import code_hash
-    print(json.dumps({task: code_hash(f"vgyro.tasks.{task}") for task in ("fuse", "decode", "simulate")}))
+    print(json.dumps({task: code_hash(f"vgyro.tasks.{task}") for task in ("fusion.fuse", "rates.decode", "simulate")}))
 """
 
 
@@ -216,7 +216,7 @@ def test_a_new_version_or_source_runs_the_jobs_again(root, tmp_path):
             install(folder, "good-gyro", case[0], "good", case[1], {"x": "good:method"})
         found[name], _ = run(root, [folder], HASHES, head="import json\n")
     assert found["one"] == found["again"]
-    fuse = [found[name]["fuse"] for name in ("none", "one", "newer", "edited")]
+    fuse = [found[name]["fusion.fuse"] for name in ("none", "one", "newer", "edited")]
     assert len(set(fuse)) == 4
-    for task in ("decode", "simulate"):
+    for task in ("rates.decode", "simulate"):
         assert len({one[task] for one in found.values()}) == 1, task

@@ -8,7 +8,7 @@ from vgyro import engine
 from vgyro.engine import ENGINES
 from vgyro.errors import EngineError, TooShort
 from vgyro.metrics import allan_deviation, averaging_factors, read_curve
-from vgyro.metrics.noise_type import block_means, exponent_by_autocorrelation, exponent_by_ratio, noise_exponents
+from vgyro.metrics.allan.noise_type import block_means, exponent_by_autocorrelation, exponent_by_ratio, noise_exponents
 
 NBS14_PHASE = [0.0, 103.11111, 123.22222, 157.33333, 166.44444, 48.55555, -96.33333, -2.22222, 111.88889, 0.0]
 

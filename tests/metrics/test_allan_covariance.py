@@ -7,7 +7,7 @@ import pytest
 from vgyro.engine import ENGINES
 from vgyro.errors import TooShort
 from vgyro.metrics import allan_deviation, cross_allan
-from vgyro.metrics.allan_covariance import correlation_limits
+from vgyro.metrics.allan.covariance import correlation_limits
 from vgyro.metrics.sampling import Sampling
 
 

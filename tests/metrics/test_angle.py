@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from vgyro.metrics.allan.coefficients import Coefficient
 from vgyro.metrics.angle import AngleGrid
-from vgyro.metrics.coefficients import Coefficient
 from vgyro.metrics.sampling import Sampling
 
 HOUR = 3600

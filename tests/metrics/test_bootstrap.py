@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from vgyro.metrics import Sampling, allan_deviation, block_length, make_units, moments, read_curve, resample
-from vgyro.metrics.bootstrap import sampled_grid, scale_limits
+from vgyro.metrics.intervals.bootstrap import sampled_grid, scale_limits
 
 
 def first_order(rho: float, samples: int, seed: int) -> np.ndarray:

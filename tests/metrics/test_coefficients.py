@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import AllanCurve, allan_deviation, model_deviation, noise_coefficients
-from vgyro.metrics.allan_model import low_pass_factor, solve
+from vgyro.metrics.allan.model import low_pass_factor, solve
 
 N, B, K = 6.17 / 60, 54.11 / 3600, 294.3 / 216000  # Jiang et al. (2012), table 2, in deg/s units
 

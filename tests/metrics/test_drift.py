@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import CrossAllan
-from vgyro.metrics.drift import DriftModel, draw, fit_drift
+from vgyro.metrics.intervals.drift import DriftModel, draw, fit_drift
 
 TAU = 2.0 ** np.arange(10)
 FLICKER = 2 * math.log(2) / math.pi

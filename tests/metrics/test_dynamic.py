@@ -7,7 +7,7 @@ import pytest
 
 from vgyro.config import MetricsOptions
 from vgyro.metrics import dynamic_errors
-from vgyro.metrics.dynamic_figures import dynamic_figures
+from vgyro.metrics.dynamic.figures import dynamic_figures
 
 RATE_HZ = 500.0
 AMPLITUDE, FREQUENCY = 62.8, 0.25  # Jiang et al. (2012), swing test

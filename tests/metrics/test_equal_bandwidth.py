@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from vgyro.config import MetricsOptions
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, select
 from vgyro.metrics import Equaliser, LowPass, Sampling, common_bandwidth
-from vgyro.metrics.static_figures import static_figures
+from vgyro.metrics.static.figures import static_figures
 
 RATE_HZ = 100.0
 OPTIONS = MetricsOptions(bootstrap=60)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import allan_deviation, correlation_matrix, correlation_of, noise_from_differences, own_samples
-from vgyro.metrics.lacking import cleaned_of
 from vgyro.metrics.sampling import Sampling
+from vgyro.metrics.static.lacking import cleaned_of
 
 RATE_HZ, SAMPLES = 100.0, 20_000
 

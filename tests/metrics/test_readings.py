@@ -21,8 +21,8 @@ from vgyro.metrics import (
     resample,
     spectral_density,
 )
-from vgyro.metrics.readings import bias_drift, rrw_read
-from vgyro.metrics.static_figures import static_figures
+from vgyro.metrics.static.figures import static_figures
+from vgyro.metrics.static.readings import bias_drift, rrw_read
 
 N, K = 6.17 / 60, 294.28 / 216000  # Jiang et al. (2012), table 2
 OPTIONS = MetricsOptions(bootstrap=200)

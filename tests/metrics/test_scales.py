@@ -5,7 +5,7 @@ import pytest
 
 from vgyro.errors import TooShort
 from vgyro.metrics import Sampling, allan_scales, cross_allan
-from vgyro.metrics import scales as module
+from vgyro.metrics.allan import scales as module
 
 
 def noise(samples, gyros=3, seed=1):

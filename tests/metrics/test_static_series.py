@@ -17,9 +17,9 @@ from vgyro.metrics import (
     paper_readings,
     spectral_density,
 )
-from vgyro.metrics.readings import density_ratio
-from vgyro.metrics.static_figures import static_figures
-from vgyro.metrics.static_series import replaced
+from vgyro.metrics.static.figures import static_figures
+from vgyro.metrics.static.readings import density_ratio
+from vgyro.metrics.static.series import replaced
 
 RATE_HZ = 50.0
 N = 0.1

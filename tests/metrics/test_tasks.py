@@ -9,8 +9,9 @@ from task_options import complete
 
 from vgyro.board import Board, parse_board
 from vgyro.storage.tables import Provenance, read_columns, read_json, write_table
-from vgyro.tasks import measure, noise
 from vgyro.tasks.common import Task
+from vgyro.tasks.figures import measure
+from vgyro.tasks.fusion import noise
 
 NOWHERE = Provenance({}, "", "")
 RATE_HZ = 50.0

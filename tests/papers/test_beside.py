@@ -8,8 +8,8 @@ from vgyro.dataset import Manifest
 from vgyro.papers import PAPERS, Evidence, load_paper
 from vgyro.papers.beside import set_beside
 from vgyro.papers.published import PublishedTable
-from vgyro.tasks.papers_evidence import at_added_rate
-from vgyro.tasks.papers_own import own_counts, own_methods
+from vgyro.tasks.papers.evidence import at_added_rate
+from vgyro.tasks.papers.own import own_counts, own_methods
 
 TABLE = {
     "number": 3,

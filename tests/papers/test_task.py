@@ -11,8 +11,8 @@ from vgyro.simulate import manifest_of, parse_twin
 from vgyro.storage.inputs import read_board
 from vgyro.storage.tables import Provenance, write_table
 from vgyro.tasks.common import Task
-from vgyro.tasks.papers import main
-from vgyro.tasks.papers_evidence import gather
+from vgyro.tasks.papers.evidence import gather
+from vgyro.tasks.papers.papers import main
 
 SECONDS = 600
 GYROS = [f"g{number}" for number in range(1, 7)]

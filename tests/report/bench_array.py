@@ -10,7 +10,7 @@ from bench_records import GYROS, NOISE, PROVENANCE
 from bench_volatility import write_bekk, write_effects, write_volatility
 
 from vgyro.fusion import ArrayNoise, FilterParameters
-from vgyro.fusion.more_gyros import MeanCorrelation, analyse
+from vgyro.more_gyros import MeanCorrelation, analyse
 from vgyro.storage.tables import write_table
 
 METHODS = (

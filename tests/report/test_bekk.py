@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.report.bekk import bekk_part, compare, sentence
 from vgyro.report.model import ArrayPart
-from vgyro.report.volatility import volatility_part
+from vgyro.report.volatility.bekk import bekk_part, compare, sentence
+from vgyro.report.volatility.section import volatility_part
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 
 @pytest.fixture(scope="module")

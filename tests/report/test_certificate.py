@@ -11,13 +11,13 @@ import pytest
 
 from vgyro.calibration.figures import FIGURES
 from vgyro.log import Log
-from vgyro.report.certificate import applied, figure_cell
-from vgyro.report.certificate_plots import certificate_plots
+from vgyro.report.calibration.certificate import applied, figure_cell
+from vgyro.report.calibration.certificate_plots import certificate_plots
+from vgyro.report.calibration.section import calibration_part
 from vgyro.report.model import DatasetPart
-from vgyro.report.scale import calibration_part
 from vgyro.report.tables import Notes
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.report.best import best_method, best_of_all
-from vgyro.report.conclusions import bad_gyros, conclude
+from vgyro.report.conclusions.best import best_method, best_of_all
+from vgyro.report.conclusions.section import bad_gyros, conclude
+from vgyro.report.fusion.moved import failing
 from vgyro.report.model import ArrayPart, DatasetPart
-from vgyro.report.moved import failing
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 GYROS = ("g1", "g2", "g3", "g4")
 

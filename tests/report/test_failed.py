@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import rest_scales
-from vgyro.report.best import FROM_ITSELF, best_of_all
-from vgyro.report.conclusions import conclude
+from vgyro.report.conclusions.best import FROM_ITSELF, best_of_all
+from vgyro.report.conclusions.section import conclude
 from vgyro.report.dataset_page import headline
-from vgyro.report.failed import failed_sentences
+from vgyro.report.fusion.failed import failed_sentences
+from vgyro.report.fusion.methods import rest_tables
 from vgyro.report.index_page import render_index
-from vgyro.report.methods import rest_tables
 from vgyro.report.model import ArrayPart, DatasetPart, RecordingPart
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 NOTE = "failed: LinAlgError: Singular matrix (a bug in vgyro; the traceback is in the log)"
 

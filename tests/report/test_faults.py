@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.report.conclusions import conclude
+from vgyro.report.conclusions.section import conclude
 from vgyro.report.dataset_page import render_dataset
-from vgyro.report.faults import fault_sentences, fault_times, faults_part
 from vgyro.report.model import ArrayPart, DatasetPart
+from vgyro.report.recordings.faults import fault_sentences, fault_times, faults_part
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 INF, NAN = float("inf"), float("nan")
 DRIFT = ("g2", "drift", 600.0, 1199.9, 10.7, 1.59, "deg/s", "g2: the bias drifts by up to +1.59 deg/s, from 600 s "

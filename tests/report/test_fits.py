@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from vgyro.engine.models import DCC_STATUSES, GARCH_STATUSES
-from vgyro.report import fits
-from vgyro.report.conclusions import limits
-from vgyro.report.fits import STATUSES, fits_map, shares, status_counts
+from vgyro.report.conclusions.section import limits
 from vgyro.report.model import GarchSummary, VolatilityPart
 from vgyro.report.plots import Bars
+from vgyro.report.volatility import fits
+from vgyro.report.volatility.fits import STATUSES, fits_map, shares, status_counts
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 ROWS = [
     (0.0, 10.0, "g1", "converged", 6),

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.report.methods import dynamic_table, response_table, rest_tables
+from vgyro.report.fusion.methods import dynamic_table, response_table, rest_tables
+from vgyro.report.fusion.moved import moved_table
 from vgyro.report.model import ArrayPart, DatasetPart
-from vgyro.report.moved import moved_table
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import ArrayNoise, FilterParameters
-from vgyro.fusion.more_gyros import MeanCorrelation, analyse
+from vgyro.more_gyros import MeanCorrelation, analyse
+from vgyro.report.fusion.more_gyros import TITLE, more_gyros_part, sentence
 from vgyro.report.model import ArrayPart, DatasetPart
-from vgyro.report.more_gyros import TITLE, more_gyros_part, sentence
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 
 @pytest.fixture(scope="module")

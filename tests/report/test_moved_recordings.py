@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from vgyro.report.conclusions import conclude, main_arrays
+from vgyro.report.conclusions.section import conclude, main_arrays
 from vgyro.report.dataset_page import headline, render_dataset
 from vgyro.report.model import DatasetPart
-from vgyro.report.recordings import recordings_part
+from vgyro.report.recordings.section import recordings_part
 from vgyro.report.sentences import moved_words
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 MOVED = {"share": 0.4, "stretches": [[18.0, 42.0]]}
 SAID = (

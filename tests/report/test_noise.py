@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vgyro.report.conclusions import bad_gyros
+from vgyro.report.conclusions.section import bad_gyros
+from vgyro.report.fusion.noise import MOST_PAIRS, PAIRS_SHOWN, allan_plot, cross_allan_plot, spectrum_plot, tones_table
 from vgyro.report.model import ArrayPart, DatasetPart, Table
-from vgyro.report.noise import MOST_PAIRS, PAIRS_SHOWN, allan_plot, cross_allan_plot, spectrum_plot, tones_table
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import read_dataset_part
+from vgyro.tasks.pages.report import read_dataset_part
 
 
 @pytest.fixture(scope="module")

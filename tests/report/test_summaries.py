@@ -7,8 +7,8 @@ import pyarrow as pa
 import pytest
 
 from vgyro.storage.tables import Provenance, TableWriter, read_columns, write_table
-from vgyro.tasks.report_rates import read_rates
-from vgyro.tasks.report_volatility import read_dcc, read_garch, read_weights
+from vgyro.tasks.pages.rates import read_rates
+from vgyro.tasks.pages.volatility import read_dcc, read_garch, read_weights
 
 PROVENANCE = Provenance({}, "", "")
 WINDOWS, GYROS = 5000, ("g1", "g2")

@@ -11,9 +11,9 @@ import pytest
 
 from vgyro.report.index_page import render_index
 from vgyro.storage.tables import read_json
-from vgyro.tasks import index, report
 from vgyro.tasks.common import Task
-from vgyro.tasks.report import Place, place_of
+from vgyro.tasks.pages import index, report
+from vgyro.tasks.pages.report import Place, place_of
 
 
 @pytest.fixture(scope="module")

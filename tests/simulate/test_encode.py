@@ -11,7 +11,7 @@ import pytest
 from vgyro.board import Board, Checksum
 from vgyro.errors import ConfigError, DataError
 from vgyro.simulate import encode_frames
-from vgyro.simulate.encode import crc, encode, to_bytes
+from vgyro.simulate.serial.encode import crc, encode, to_bytes
 
 NINE = np.frombuffer(b"123456789", dtype=np.uint8)[None, :]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vgyro.simulate.line import damage
+from vgyro.simulate.serial.line import damage
 from vgyro.simulate.twin import LineDamage
 
 FRAME, FRAMES = 30, 400

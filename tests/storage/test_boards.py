@@ -7,7 +7,7 @@ import pytest
 from storage_frames import ahrs, dsp6_frame, dsp6_text_line, dsp3000, kvh, mimu_packet, stim, vectornav, xsens
 
 from vgyro.storage import decode_dump
-from vgyro.storage.sniff import all_boards, sniff
+from vgyro.storage.dumps.sniff import all_boards, sniff
 
 COUNT = 300
 

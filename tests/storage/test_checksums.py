@@ -9,7 +9,7 @@ from storage_frames import dsp6_frame
 from vgyro.board import Board, Checksum
 from vgyro.engine.reference.frames import checksum, verifier
 from vgyro.storage import decode_dump
-from vgyro.storage.textscan import xor_of
+from vgyro.storage.dumps.text_scan import xor_of
 
 
 def of(text: bytes, **rule) -> int:

@@ -10,10 +10,10 @@ from storage_frames import BOARDS, dsp6_frame, dsp6_stream, dsp6_text_line, mimu
 
 from vgyro.config import IntegrityOptions
 from vgyro.storage import decode_dump
-from vgyro.storage.dumps import DumpReader
+from vgyro.storage.dumps.reader import DumpReader
+from vgyro.storage.dumps.selection import CounterRule, select
 from vgyro.storage.frames import gather
 from vgyro.storage.inputs import read_board
-from vgyro.storage.selection import CounterRule, select
 
 CORRUPTIONS = 1000
 LENIENT = IntegrityOptions(min_good_share=0)

@@ -10,7 +10,7 @@ from storage_frames import crc, dsp6_frame, dsp6_stream
 
 from vgyro.board import Board
 from vgyro.storage import Refused, decode_dump
-from vgyro.storage.diagnose import diagnose
+from vgyro.storage.dumps.diagnose import diagnose
 
 COUNT = 400
 

@@ -8,8 +8,8 @@ from vgyro.config import IntegrityOptions
 from vgyro.dataset import Recording
 from vgyro.log import Log
 from vgyro.storage import decode_dump, open_recording
+from vgyro.storage.dumps.sniff import all_boards, sniff
 from vgyro.storage.frames import gather
-from vgyro.storage.sniff import all_boards, sniff
 
 
 @pytest.mark.parametrize(("name", "packets"), [("exp_1", 37_439), ("exp_2", 39_301)])

@@ -8,11 +8,11 @@ from storage_frames import dsp6_text_line
 
 from vgyro.board import Board
 from vgyro.config import IntegrityOptions
-from vgyro.storage.dumps import DumpReader
+from vgyro.storage.dumps.reader import DumpReader
+from vgyro.storage.dumps.sniff import sniff
+from vgyro.storage.dumps.text_form import Kinds, fault_of, first_is_whole, opening, recurring_forms
 from vgyro.storage.frames import gather
 from vgyro.storage.integrity import Refused
-from vgyro.storage.sniff import sniff
-from vgyro.storage.textform import Kinds, fault_of, first_is_whole, opening, recurring_forms
 
 LENIENT = IntegrityOptions(min_good_share=0)
 

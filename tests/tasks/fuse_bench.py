@@ -6,8 +6,9 @@ import numpy as np
 from task_options import complete
 
 from vgyro.storage.tables import Provenance, TableWriter, read_columns, write_json, write_table
-from vgyro.tasks import fuse, series, volatility
 from vgyro.tasks.common import Task
+from vgyro.tasks.fusion import fuse
+from vgyro.tasks.volatility import assemble, series
 
 GYROS = ("g1", "g2", "g3")
 RATE_HZ, SECONDS = 10.0, 400
@@ -79,7 +80,7 @@ def run_volatility(folder):
         made = {name: f"{definition}/{name}.parquet" for name in ("garch", "dcc", "arch_lm", "weights", "fits")}
         (folder / definition).mkdir(exist_ok=True)
         options = {"definition": definition, "injected_rate": INJECTED if definition == "moved" else None}
-        volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, **options))
+        assemble.main(task_of(folder, {"series": ["series.parquet"]}, made, **options))
 
 
 def fuse_in(folder, tables=(), read=True, moved=(), **keywords):

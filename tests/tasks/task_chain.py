@@ -11,8 +11,11 @@ from task_options import complete
 
 from vgyro.dataset import Manifest
 from vgyro.storage.tables import Provenance, read_columns, read_json, read_metadata, write_json, write_table
-from vgyro.tasks import convert, crosscheck, faults, fuse, measure, noise, series, volatility
 from vgyro.tasks.common import Task
+from vgyro.tasks.figures import crosscheck, measure
+from vgyro.tasks.fusion import faults, fuse, noise
+from vgyro.tasks.rates import convert
+from vgyro.tasks.volatility import assemble, series
 
 RATE_HZ, SIGMA = 100.0, 0.05
 DEFINITIONS = ("level", "residual")
@@ -87,7 +90,7 @@ class Chain:
             (self.folder / definition).mkdir(exist_ok=True)
             outputs = tuple(f"{definition}/{name}.parquet" for name in ("garch", "dcc", "arch_lm", "weights", "fits"))
             added = 0.05 if definition == "moved" else None
-            self.run(volatility, {"series": "series.parquet"}, outputs, definition=definition, injected_rate=added)
+            self.run(assemble, {"series": "series.parquet"}, outputs, definition=definition, injected_rate=added)
         return {"weights": [f"{name}/weights.parquet" for name in DEFINITIONS], "moved": ["moved/weights.parquet"]}
 
     def crosscheck(self) -> dict[str, np.ndarray]:

@@ -11,9 +11,9 @@ from task_options import complete
 from vgyro.engine.covariance import conditional_covariance
 from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, write_table
-from vgyro.tasks import bekk, volatility
 from vgyro.tasks.common import Task
-from vgyro.tasks.volatility_series import open_series, stored_model
+from vgyro.tasks.volatility import assemble, bekk
+from vgyro.tasks.volatility.stored import open_series, stored_model
 
 GYROS = ["g1", "g2", "g3"]
 DEFINITIONS = ("difference", "residual")
@@ -55,7 +55,7 @@ def make(folder: Path, values: np.ndarray) -> Task:
         (folder / definition).mkdir(parents=True)
         outputs = {name: f"{definition}/{name}.parquet" for name in TABLES}
         inputs = {"series": ["series.parquet"], "garch": [], "dcc": [], "weights": []}
-        volatility.main(task_of(folder, inputs, outputs, definition=definition))
+        assemble.main(task_of(folder, inputs, outputs, definition=definition))
     inputs = {name: [f"{definition}/{name}.parquet" for definition in DEFINITIONS] for name in ("garch", "dcc")}
     return task_of(folder, {"series": ["series.parquet"], **inputs}, {"bekk": "bekk.parquet"})
 

@@ -7,7 +7,7 @@ import pytest
 
 from vgyro.board import Board, Temperature, parse_board
 from vgyro.storage.tables import Provenance, TableWriter, read_column, write_table
-from vgyro.tasks.block_means import block_means, thermometer_of
+from vgyro.tasks.rates.block_means import block_means, thermometer_of
 
 NOWHERE = Provenance({}, "", "")
 

@@ -29,51 +29,65 @@ def changed_by_edit(package: Path, file: str, tasks: list[str]) -> set[str]:
     return {task for task in tasks if closure.code_hash(f"vgyro.tasks.{task}") != before[task]}
 
 
-TASKS = ["decode", "calibrate", "convert", "volatility", "fuse", "noise", "measure", "report"]
+DECODE, CONVERT, CALIBRATE = "rates.decode", "rates.convert", "calibration.calibrate"
+FUSE, NOISE, MEASURE, REPORT = "fusion.fuse", "fusion.noise", "figures.measure", "pages.report"
+TASKS = [DECODE, CALIBRATE, CONVERT, "volatility.assemble", FUSE, NOISE, MEASURE, REPORT]
 
 
 def test_editing_metrics_changes_the_stages_that_measure(package: Path) -> None:
-    assert changed_by_edit(package, "metrics/allan.py", TASKS) == {"noise", "measure"}
+    assert changed_by_edit(package, "metrics/allan/deviation.py", TASKS) == {NOISE, MEASURE}
 
 
 def test_editing_a_filter_does_not_fit_the_windows_again(package: Path) -> None:
-    assert changed_by_edit(package, "fusion/filters.py", TASKS) == {"fuse"}
+    assert changed_by_edit(package, "fusion/papers/rate_filters.py", TASKS) == {FUSE}
 
 
 def test_editing_the_report_changes_the_report_alone(package: Path) -> None:
-    assert changed_by_edit(package, "report/page.py", TASKS) == {"report"}
+    assert changed_by_edit(package, "report/page.py", TASKS) == {REPORT}
 
 
 def test_editing_a_template_changes_the_report_alone(package: Path) -> None:
-    assert changed_by_edit(package, "report/templates/page.html", TASKS) == {"report"}
+    assert changed_by_edit(package, "report/templates/page.html", TASKS) == {REPORT}
 
 
 def test_editing_the_decoder_changes_decoding_alone(package: Path) -> None:
-    changed = changed_by_edit(package, "storage/scan.py", TASKS)
-    assert changed == {"decode"}, "the stages after it read tables only"
+    changed = changed_by_edit(package, "storage/dumps/scan.py", TASKS)
+    assert changed == {DECODE}, "the stages after it read tables only"
 
 
 def test_editing_units_changes_everything_that_converts(package: Path) -> None:
-    assert {"measure", "noise"} <= changed_by_edit(package, "units.py", TASKS)
+    assert {MEASURE, NOISE} <= changed_by_edit(package, "units.py", TASKS)
 
 
 def test_imports_inside_functions_count() -> None:
     # vgyro.engine loads the reference engine when it is asked for, not before.
-    assert "vgyro.engine.reference.garch" in closure.import_closure("vgyro.tasks.volatility")
+    assert "vgyro.engine.reference.garch" in closure.import_closure("vgyro.tasks.volatility.assemble")
 
 
-@pytest.mark.parametrize("module", ["parquet", "ulog", "bag", "numpy_file", "matlab", "mat5", "text.fast", "joined"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        *(f"binary.{name}" for name in ("parquet", "ulog", "bag", "numpy_file", "matlab", "mat5")),
+        "text.fast",
+        "joined",
+    ],
+)
 def test_every_reader_of_logs_counts_for_decoding(module: str) -> None:
-    assert f"vgyro.storage.logs.{module}" in closure.import_closure("vgyro.tasks.decode")
+    assert f"vgyro.storage.logs.{module}" in closure.import_closure("vgyro.tasks.rates.decode")
 
 
-EVERY = [path.stem for path in Path(closure.__file__).parent.glob("*.py") if "SECTIONS = " in path.read_text("utf-8")]
+FOLDER = Path(closure.__file__).parent
+EVERY = [
+    ".".join(path.relative_to(FOLDER).with_suffix("").parts)
+    for path in sorted(FOLDER.rglob("*.py"))
+    if "SECTIONS = " in path.read_text("utf-8")
+]
 
 
 @pytest.mark.parametrize("task", EVERY)
 def test_what_a_task_asks_for_it_names(task: str) -> None:
     """Every `task.section("x", …)` and `task.engine` of its module is in its SECTIONS, and these are sections."""
-    source = Path(closure.__file__).with_name(f"{task}.py").read_text(encoding="utf-8")
+    source = closure._source(f"vgyro.tasks.{task}").read_text(encoding="utf-8")
     asked = {node.args[0].value for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)
              and isinstance(node.func, ast.Attribute) and node.func.attr == "section"}  # fmt: skip
     asked |= {"engine"} if "task.engine" in source else set()
@@ -82,7 +96,7 @@ def test_what_a_task_asks_for_it_names(task: str) -> None:
     assert declared <= {"manifest", "board", *Analysis.model_fields}
 
 
-@pytest.mark.parametrize("task", sorted({*EVERY} - {"report"}))  # The page shows all of them.
+@pytest.mark.parametrize("task", sorted({*EVERY} - {"pages.report"}))  # The page shows all of them.
 def test_what_a_task_names_is_asked_for(task: str) -> None:
     """By its module or another that it reaches: a section that nobody reads would re-run it for nothing."""
     modules = (name for name in closure.import_closure(f"vgyro.tasks.{task}") if name.startswith("vgyro.tasks."))

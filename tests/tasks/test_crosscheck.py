@@ -15,9 +15,11 @@ from task_options import complete
 from vgyro.engine import independent
 from vgyro.metrics import allan_deviation
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
-from vgyro.tasks import crosscheck, fuse, series, volatility
 from vgyro.tasks.common import Task
-from vgyro.tasks.crosscheck_rows import compare, compare_maximum
+from vgyro.tasks.figures import crosscheck
+from vgyro.tasks.figures.crosscheck_rows import compare, compare_maximum
+from vgyro.tasks.fusion import fuse
+from vgyro.tasks.volatility import assemble, series
 
 GYROS = ("g1", "g2", "g3")
 DEFINITIONS = ("difference", "level", "residual")
@@ -82,7 +84,7 @@ def run_stages(folder: Path, engine: str) -> None:
     for name in DEFINITIONS:
         (folder / name).mkdir()
         made = {table: f"{name}/{table}.parquet" for table in TABLES}
-        volatility.main(task_of(folder, {"series": ["series.parquet"]}, made, definition=name, engine=engine))
+        assemble.main(task_of(folder, {"series": ["series.parquet"]}, made, definition=name, engine=engine))
     inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"], "weights": []}
     fuse.main(task_of(folder, inputs, OUTPUTS, engine=engine))
     segment = read_columns(folder / "rates.parquet", ["segment"])["segment"]

@@ -12,7 +12,7 @@ from vgyro.dataset import Manifest
 from vgyro.storage.inputs import read_board
 from vgyro.storage.tables import read_json, read_metadata
 from vgyro.tasks.common import run_task
-from vgyro.tasks.decode import main
+from vgyro.tasks.rates.decode import main
 
 BOARDS = Path(__file__).resolve().parents[2] / "config" / "boards"
 

@@ -6,8 +6,9 @@ from task_chain import RATE_HZ, SIGMA, Chain
 from task_options import complete
 
 from vgyro.board import Board
-from vgyro.tasks import convert, faults, fuse, noise
-from vgyro.tasks.delays import Lateness, noise_left
+from vgyro.tasks.fusion import faults, fuse, noise
+from vgyro.tasks.rates import convert
+from vgyro.tasks.rates.delays import Lateness, noise_left
 
 GYROS = ("g1", "g2", "g3", "g4")
 SECONDS = 120

@@ -9,9 +9,9 @@ from task_options import complete
 from vgyro.board import Board
 from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_table
-from vgyro.tasks import effects, volatility
 from vgyro.tasks.common import Task
-from vgyro.volatility.whiten import block_gain
+from vgyro.tasks.volatility import assemble, effects
+from vgyro.volatility.effects.whiten import block_gain
 
 GYROS = ["g1", "g2", "g3"]
 SAMPLES = 1200
@@ -61,7 +61,7 @@ def with_garch(task: Task, folder: Path) -> Task:
     """The task with GARCH fits of the level, as the rule volatility writes them."""
     tables = {name: folder / f"{name}.parquet" for name in ("garch", "dcc", "arch_lm", "weights", "fits")}
     parts: dict[str, list[Path]] = {"garch": [], "dcc": [], "weights": []}
-    volatility.main(Task({"series": task.inputs["series"], **parts}, tables, task.options, "code"))
+    assemble.main(Task({"series": task.inputs["series"], **parts}, tables, task.options, "code"))
     return Task({**task.inputs, "garch": [tables["garch"]]}, task.outputs, task.options, "code")
 
 

@@ -7,9 +7,9 @@ import pytest
 from task_options import complete
 
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
-from vgyro.tasks import faults
 from vgyro.tasks.common import Task
-from vgyro.tasks.fusion_inputs import open_array
+from vgyro.tasks.fusion import faults
+from vgyro.tasks.fusion.array_inputs import open_array
 
 GYROS = ("g1", "g2", "g3", "g4")
 RATE_HZ, SECONDS, GAP_AT, GAP_S = 20.0, 600, 8000, 2.0

@@ -28,7 +28,8 @@ from fuse_bench import (
 from vgyro.engine import ENGINES
 from vgyro.fusion import METHODS, Fused, Method, blocks
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_table
-from vgyro.tasks import crosscheck, fuse, fusion_inputs
+from vgyro.tasks.figures import crosscheck
+from vgyro.tasks.fusion import array_inputs, fuse
 
 
 def test_every_method_has_its_row_and_column(analysed):
@@ -66,7 +67,7 @@ def test_weights_of_single_samples(tmp_path, monkeypatch):
     # The series is at the full rate and lacks some samples; row groups, pieces and blocks all end at different places.
     # Expected: the weights of the row with the sample's time, equal ones where there is none.
     monkeypatch.setattr(blocks, "PIECE", 256)
-    monkeypatch.setattr(fusion_inputs, "ROW_GROUP", 500)
+    monkeypatch.setattr(array_inputs, "ROW_GROUP", 500)
     rate, _ = write_inputs(tmp_path)
     time = read_columns(tmp_path / "rates.parquet")["time"]
     there = (np.arange(len(time)) % 1700 > 40) & (time < time[-30])
@@ -94,12 +95,12 @@ def test_both_engines_fuse_alike(analysed):
 
 
 def test_same_bytes_for_any_threads_and_instruction_set(analysed, tmp_path):
-    # As the workflow runs it: python -m vgyro.tasks.fuse.
+    # As the workflow runs it: python -m vgyro.tasks.fusion.fuse.
     tables = [str(analysed / name / "weights.parquet") for name in DEFINITIONS]
     task = task_of(analysed, {}, {})
     written = set()
     for extra in ({"VGYRO_THREADS": "1"}, {"VGYRO_THREADS": "3"}, {"VGYRO_ISA": "baseline"}):
-        command = [sys.executable, "-m", "vgyro.tasks.fuse", "--input", "rates", str(analysed / "rates.parquet")]
+        command = [sys.executable, "-m", "vgyro.tasks.fusion.fuse", "--input", "rates", str(analysed / "rates.parquet")]
         command += ["--input", "noise", str(analysed / "noise.json"), "--input", "weights", *tables]
         command += ["--output", "fused", str(tmp_path / "f.parquet")]
         command += [

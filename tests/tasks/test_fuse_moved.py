@@ -16,7 +16,7 @@ from fuse_bench import (
 
 from vgyro.fusion import METHODS, Fused, Method
 from vgyro.storage.tables import read_columns, read_metadata
-from vgyro.tasks import fusion_inputs
+from vgyro.tasks.fusion import array_inputs
 
 
 def test_moved_is_another_recording_that_turns(analysed, tmp_path):
@@ -42,7 +42,7 @@ def test_moved_is_another_recording_that_turns(analysed, tmp_path):
         np.testing.assert_allclose(fused[column], expected[column] - INJECTED, atol=1e-4, err_msg=column)
     assert {name: said[name] for name in answering} == {name: name for name in answering}
     assert said[""] == ""  # of the method that could not run
-    # The rate does something to each of these (of the level it shrinks: tests/fusion/test_constant_rate.py).
+    # The rate does something to each of these (of the level it shrinks: tests/fusion/motion/test_constant_rate.py).
     for name in answering:
         assert np.abs(moved[name] - fused[name]).max() > 1e-5, name
     about = read_metadata(analysed / "moved.parquet")
@@ -71,7 +71,7 @@ def test_level_weights_of_single_samples_are_not_estimated_again(tmp_path):
     write_weights(tmp_path / "level/weights.parquet", time, [("dcc", "in_sample")], row_group=4000)
     _, methods = fuse_in(tmp_path, ["level/weights.parquet"], analysis=FULL, injected_rate=INJECTED)
     said = dict(zip(methods["column"], methods["moved"], strict=True))
-    assert said["dcc_in_sample[level]"] == f"not known: {fusion_inputs.NOT_AT_FULL_RATE}."
+    assert said["dcc_in_sample[level]"] == f"not known: {array_inputs.NOT_AT_FULL_RATE}."
     assert said["ewma_causal"] == "ewma_causal"
 
 

@@ -9,10 +9,10 @@ import pytest
 from task_chain import DEFINITIONS, RATE_HZ, Chain, white
 
 from vgyro.storage.tables import read_columns
-from vgyro.tasks import effects
-from vgyro.tasks.noise_record import read_noise
-from vgyro.tasks.rates_file import read_array, read_temperature
-from vgyro.tasks.report_rates import read_rates
+from vgyro.tasks.fusion.noise_record import read_noise
+from vgyro.tasks.pages.rates import read_rates
+from vgyro.tasks.rates.rates_file import read_array, read_temperature
+from vgyro.tasks.volatility import effects
 
 GYROS = ("g1", "g2", "g3", "g4")
 SECONDS = 60

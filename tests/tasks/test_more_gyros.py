@@ -8,8 +8,8 @@ from task_options import complete
 
 from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
-from vgyro.tasks import more_gyros
 from vgyro.tasks.common import Task
+from vgyro.tasks.fusion import more_gyros
 
 GYROS = ["g1", "g2", "g3"]
 

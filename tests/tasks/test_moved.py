@@ -5,9 +5,9 @@ import pytest
 from task_chain import RATE_HZ, SIGMA, Chain, white
 
 from vgyro.storage.tables import read_columns
-from vgyro.tasks.fusion_inputs import in_motion
-from vgyro.tasks.noise import source_of
-from vgyro.tasks.report_rates import read_rates
+from vgyro.tasks.fusion.array_inputs import in_motion
+from vgyro.tasks.fusion.noise import source_of
+from vgyro.tasks.pages.rates import read_rates
 
 GYROS = ("g1", "g2")
 N = SIGMA / np.sqrt(RATE_HZ)

@@ -7,8 +7,9 @@ from task_chain import Chain, white
 from task_options import complete
 
 from vgyro.metrics import Sampling, allan_scales
-from vgyro.tasks import convert, noise
-from vgyro.tasks.noise_record import noise_of_record, read_noise
+from vgyro.tasks.fusion import noise
+from vgyro.tasks.fusion.noise_record import noise_of_record, read_noise
+from vgyro.tasks.rates import convert
 
 GYROS = ("g1", "g2", "g3")
 INPUTS = {"frames": "frames.parquet", "integrity": "integrity.json", "calibration": "calibration.json"}

@@ -7,9 +7,9 @@ from task_options import complete
 from vgyro.board import Board
 from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_table
-from vgyro.tasks import series, volatility, volatility_chunk
 from vgyro.tasks.common import Task
-from vgyro.tasks.volatility_series import WHOLE, open_series, stored_model
+from vgyro.tasks.volatility import assemble, chunk, series
+from vgyro.tasks.volatility.stored import WHOLE, open_series, stored_model
 from vgyro.volatility import Window, fit_garch, windows
 
 WINDOW, STEP = 120, 50
@@ -59,12 +59,12 @@ def run_volatility(folder, options, chunks=1):
     """Run the task `volatility`, after `chunks` jobs that make the parts, or by itself; read the tables."""
     known = {"series": [folder / "series.parquet"]}
     parts = {name: [] for name in PARTS}
-    for chunk in range(1, chunks + 1) if chunks > 1 else ():
-        made = {name: folder / f"{name}.{chunk}.parquet" for name in PARTS}
-        volatility_chunk.main(Task(known, made, {**options, "chunk": f"{chunk}-of-{chunks}"}, "code"))
+    for number in range(1, chunks + 1) if chunks > 1 else ():
+        made = {name: folder / f"{name}.{number}.parquet" for name in PARTS}
+        chunk.main(Task(known, made, {**options, "chunk": f"{number}-of-{chunks}"}, "code"))
         parts = {name: [*paths, made[name]] for name, paths in parts.items()}
     outputs = {name: folder / f"{name}.parquet" for name in TABLES}
-    volatility.main(Task({**known, **parts}, outputs, options, "code"))
+    assemble.main(Task({**known, **parts}, outputs, options, "code"))
     return {name: read_columns(path) for name, path in outputs.items()}
 
 
@@ -169,9 +169,9 @@ def test_the_tables_do_not_depend_on_the_jobs(tmp_path, definition, monkeypatch)
         for name in TABLES:
             assert (tmp_path / f"{name}.parquet").read_bytes() == expected[name], (chunks, name)
     # Nor on how many windows are fitted at once, and how much of the series is read.
-    monkeypatch.setattr(volatility_chunk, "BATCH_WINDOWS", 2)
-    monkeypatch.setattr(volatility_chunk, "FAR", 100)
-    monkeypatch.setattr("vgyro.tasks.volatility_series.SLAB", 200)
+    monkeypatch.setattr(chunk, "BATCH_WINDOWS", 2)
+    monkeypatch.setattr(chunk, "FAR", 100)
+    monkeypatch.setattr("vgyro.tasks.volatility.stored.SLAB", 200)
     run_volatility(tmp_path, options)
     for name in TABLES:
         assert (tmp_path / f"{name}.parquet").read_bytes() == expected[name], name
@@ -236,7 +236,7 @@ def test_a_stored_model_is_that_of_its_window(tables):
 
 
 def test_a_long_stretch_stands_for_itself_by_its_beginning(tmp_path, monkeypatch):
-    monkeypatch.setattr("vgyro.tasks.volatility_series.WHOLE_SAMPLES", 150)
+    monkeypatch.setattr("vgyro.tasks.volatility.stored.WHOLE_SAMPLES", 150)
     found = run_all(tmp_path, noise(300, 2))
     assert (found["dcc"]["start"][0], found["dcc"]["stop"][0]) == (0, 150)
     assert set(found["arch_lm"]["samples"]) == {150}

@@ -8,12 +8,12 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.signal import lfilter
 
-from vgyro.metrics.spectrum import spectral_density
-from vgyro.metrics.tones import find_tones
+from vgyro.metrics.spectra.tones import find_tones
+from vgyro.metrics.spectra.welch import spectral_density
 from vgyro.volatility import block_means, fit_garch
-from vgyro.volatility.effects import Garch, RateTone, Sampled, alias, gather_evidence
-from vgyro.volatility.verdicts import Effect, explain_array
-from vgyro.volatility.whiten import block_gain
+from vgyro.volatility.effects.kinds import Garch, RateTone, Sampled, alias, gather_evidence
+from vgyro.volatility.effects.verdicts import Effect, explain_array
+from vgyro.volatility.effects.whiten import block_gain
 
 SIGMA = 0.04  # deg/s, of the 1 Hz means
 T = 3600

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from vgyro.volatility.arch_lm import arch_lm
-from vgyro.volatility.whiten import block_gain, fit_autoregression, running_median, whiten
+from vgyro.volatility.effects.whiten import block_gain, fit_autoregression, running_median, whiten
 
 SPAN = 61
 

@@ -120,7 +120,7 @@ def test_what_is_missing_half_way_to_a_page_is_made_again(lab) -> None:
 
 def broken_run(lab):
     """A run in which the fuse stage fails."""
-    stage = lab.folder / "vgyro/tasks/fuse.py"
+    stage = lab.folder / "vgyro/tasks/fusion/fuse.py"
     kept = stage.read_text(encoding="utf-8")
     stage.write_text(kept.replace("def main(", "raise SystemExit('no power')\n\n\ndef main("), encoding="utf-8")
     done = lab.run("--cores", "2")

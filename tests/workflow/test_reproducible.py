@@ -31,7 +31,7 @@ def test_second_run_one_core_and_edits(lab) -> None:
     config.write_text("# a remark\n" + config.read_text(encoding="utf-8"), encoding="utf-8")
     assert "Nothing to be done" in lab.run("--cores", "2", "--dry-run").stdout
 
-    source = lab.folder / "vgyro/metrics/allan.py"
+    source = lab.folder / "vgyro/metrics/allan/deviation.py"
     source.write_text(source.read_text(encoding="utf-8") + "\n# edited\n", encoding="utf-8")
     planned = jobs_planned(lab.run("--cores", "2", "--dry-run").stdout)
     assert {"measure", "report"} <= planned

@@ -27,12 +27,12 @@ from vgyro.dataset import AT_REST, FileReference, Manifest, PlateauReference, Re
 from vgyro.errors import VgyroError
 from vgyro.log import LogArray
 from vgyro.storage.decode import open_recording
-from vgyro.storage.diagnose import diagnose
+from vgyro.storage.dumps.diagnose import diagnose
+from vgyro.storage.dumps.sniff import probe
 from vgyro.storage.inputs import data_files
 from vgyro.storage.integrity import Integrity
-from vgyro.storage.sniff import probe
 from vgyro.storage.sources import open_sources
-from vgyro.tasks.calibrate_tables import Source, plateaus_of
+from vgyro.tasks.calibration.tables import Source, plateaus_of
 from vgyro.tasks.inputs_check import MANIFEST, Dataset, reference_file
 from vgyro.validation import Problem, locate
 

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     if options.board:
         board = read_board(options.board, boards=options.boards)
     else:
-        from vgyro.cli.sniffing import best_board
+        from vgyro.cli.drafts.sniffing import best_board
 
         board = best_board(options.dumps[0], options.boards)[0]
     recording = Recording(name="dump", kind="free", files=tuple(map(str, options.dumps)))

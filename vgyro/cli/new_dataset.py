@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vgyro.cli.found import Found
+    from vgyro.cli.drafts.found import Found
 
 EPILOG = """\
 examples:
@@ -92,8 +92,8 @@ def run(options: argparse.Namespace) -> int:
 
 def write(options: argparse.Namespace) -> tuple[Path, Found]:
     """Look at the files and write the manifest.  returns : its path, and what was found"""
-    from vgyro.cli.found import find
-    from vgyro.cli.manifest_text import manifest_text
+    from vgyro.cli.drafts.found import find
+    from vgyro.cli.drafts.manifest_text import manifest_text
     from vgyro.dataset import check_against_board, parse_manifest
     from vgyro.storage.tables import write_text
 

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 from vgyro.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, Method
     from vgyro.fusion.blocks import SampleWeights, block_of_sample
     from vgyro.fusion.registry import METHODS, Outcome, run_methods, select
     from vgyro.fusion.response import Response, measured_response
+    from vgyro.fusion.types import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused, Method
     from vgyro.fusion.weights import min_variance_weights, usable
 
 __all__ = [
@@ -39,7 +39,7 @@ _WEIGHTS = ("min_variance_weights", "usable")
 __getattr__ = lazy_exports(
     __name__,
     {
-        **dict.fromkeys(_ARRAY, "array"),
+        **dict.fromkeys(_ARRAY, "types"),
         **dict.fromkeys(_BLOCKS, "blocks"),
         **dict.fromkeys(_REGISTRY, "registry"),
         **dict.fromkeys(_RESPONSE, "response"),

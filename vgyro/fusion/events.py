@@ -48,7 +48,7 @@ class FaultEvent:
 def excluded(events: Iterable[FaultEvent], samples: int, gyros: int) -> list[np.ndarray]:
     """Stretches [M, 2] of samples in which each gyro is at fault, in order and without overlap: one array a gyro.
 
-    A gyro that clips is right between the ends of its range: vgyro.fusion.clipped finds the samples that are not.
+    A gyro that clips is right between the ends of its range: the samples that are not: vgyro.fusion.samples.clipped.
     """
     found = []
     at_fault = [one for one in events if one.kind != "clipped"]

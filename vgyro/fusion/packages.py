@@ -12,8 +12,8 @@ from dataclasses import replace
 from importlib.metadata import EntryPoint
 from typing import Any
 
-from vgyro.fusion.array import Method
 from vgyro.fusion.installed import GROUP, method_entries, package_of
+from vgyro.fusion.types import Method
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 RESERVED = ("time", "segment")

@@ -11,26 +11,22 @@ from typing import Literal
 import numpy as np
 
 from vgyro.errors import ConfigError, VgyroError
-from vgyro.fusion import (
+from vgyro.fusion import operation_counts
+from vgyro.fusion.baselines import fixed, moments
+from vgyro.fusion.ours import frequency_weights, parity_weights, recommended, smoothed
+from vgyro.fusion.packages import methods_of_packages
+from vgyro.fusion.papers import (
     al_majed,
     bayard_ploen,
     chang_2008,
-    costs,
-    filters,
-    fixed,
-    moments,
-    parity_rows,
-    recommended,
+    rate_filters,
     scale_wise,
-    slow_rows,
-    smoothed,
     stubberud,
     vaccaro_zaki,
     waegli_guerrier,
 )
-from vgyro.fusion.array import ArrayRates, CannotRun, FilterParameters, Fused, Method
-from vgyro.fusion.conditional import SAME_AT_ANY_RATE, conditional
-from vgyro.fusion.packages import methods_of_packages
+from vgyro.fusion.papers.conditional import SAME_AT_ANY_RATE, conditional
+from vgyro.fusion.types import ArrayRates, CannotRun, FilterParameters, Fused, Method
 from vgyro.fusion.unusable import on_usable
 from vgyro.validation import did_you_mean
 
@@ -49,7 +45,7 @@ def _conditional(model: str, mode: str, source: str) -> Method:
     causal = mode == "causal"
     return Method(
         f"{model}_{mode}", title, source, causal, ("weights",), conditional(model, mode),
-        per_definition=True, same_at_any_rate=SAME_AT_ANY_RATE, operations=costs.weighted,
+        per_definition=True, same_at_any_rate=SAME_AT_ANY_RATE, operations=operation_counts.weighted,
     )  # fmt: skip
 
 
@@ -63,25 +59,25 @@ _SMOOTHED = {"": "Σw = 1, only differences between the gyros are looked at, and
 # fmt: off
 _BASELINES = (
     Method("average", "Average", "baseline", True, (), fixed.average, same_at_any_rate=_FIXED,
-           family="baseline", operations=costs.weighted),
+           family="baseline", operations=operation_counts.weighted),
     Method("median", "Median", "baseline", True, (), fixed.median, same_at_any_rate=_MEDIAN,
-           family="baseline", operations=costs.sorted_median),
+           family="baseline", operations=operation_counts.sorted_median),
     Method("inverse_variance_arw", "Inverse variance, ARW", "w ∝ 1/N²", True, ("arw",),
            on_usable(fixed.inverse_variance_arw),
-           same_at_any_rate=_FIXED, family="baseline", operations=costs.weighted),
+           same_at_any_rate=_FIXED, family="baseline", operations=operation_counts.weighted),
     Method("inverse_variance_rrw", "Inverse variance, RRW", "w ∝ 1/K²", True, ("rrw",),
            on_usable(fixed.inverse_variance_rrw, needs_arw=False),
-           same_at_any_rate=_FIXED, family="baseline", operations=costs.weighted),
+           same_at_any_rate=_FIXED, family="baseline", operations=operation_counts.weighted),
     Method("rolling_moment", "Rolling second moment", "w ∝ 1/m²", True, (), moments.rolling_moment,
-           family="baseline", operations=costs.moments),
+           family="baseline", operations=operation_counts.moments),
     Method("ewma_causal", "EWMA second moment, causal", "w ∝ 1/m²", True, (), moments.ewma_causal,
-           family="baseline", operations=costs.moments),
+           family="baseline", operations=operation_counts.moments),
     Method("ewma_two_sided", "EWMA second moment, two-sided", "w ∝ 1/m²", False, (), moments.ewma_two_sided,
-           family="baseline", operations=costs.moments),
+           family="baseline", operations=operation_counts.moments),
     Method("average_smoothed", "Average, smoothed", OWN, False, (), smoothed.average_smoothed,
-           same_at_any_rate=_SMOOTHED, family="baseline", operations=costs.smoothed_average),
+           same_at_any_rate=_SMOOTHED, family="baseline", operations=operation_counts.smoothed_average),
     Method("median_smoothed", "Median, smoothed", OWN, False, (), smoothed.median_smoothed,
-           same_at_any_rate=_SMOOTHED, family="baseline", operations=costs.smoothed_median),
+           same_at_any_rate=_SMOOTHED, family="baseline", operations=operation_counts.smoothed_median),
 )
 _PAPERS = (
     Method("bayard_ploen", "Bayard & Ploen 2003, parity form", bayard_ploen.SOURCE, True, ("arw", "rrw", "correlation"),
@@ -93,14 +89,15 @@ _PAPERS = (
            on_usable(stubberud.stubberud_2008), operations=stubberud.operations, inferred=stubberud.INFERRED),
     Method("al_majed", "Al-Majed 2009, adaptive bank", AL_MAJED, True, ("arw",), on_usable(al_majed.al_majed),
            same_at_any_rate=_BANK, operations=al_majed.operations, inferred=al_majed.INFERRED),
-    Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), on_usable(filters.jiang_markov),
-           operations=costs.low_passed),
+    Method("jiang_markov", "Jiang 2012, Markov rate", JIANG, True, ("arw",), on_usable(rate_filters.jiang_markov),
+           operations=operation_counts.low_passed),
     Method("jiang_random_walk", "Jiang 2012, random walk", f"{JIANG}, 1/τ → 0", True, ("arw",),
-           on_usable(filters.jiang_random_walk), same_at_any_rate=_UNIT_GAIN, operations=costs.low_passed),
-    Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), on_usable(filters.xue_2012),
-           same_at_any_rate=_UNIT_GAIN, operations=costs.settling, inferred="P0 = 1/(D·T)"),
-    Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), on_usable(filters.chang_2012),
-           same_at_any_rate=_UNIT_GAIN, operations=costs.low_passed),
+           on_usable(rate_filters.jiang_random_walk), same_at_any_rate=_UNIT_GAIN,
+           operations=operation_counts.low_passed),
+    Method("xue_2012", "Xue 2012, analytic covariance", XUE, True, ("arw",), on_usable(rate_filters.xue_2012),
+           same_at_any_rate=_UNIT_GAIN, operations=operation_counts.settling, inferred="P0 = 1/(D·T)"),
+    Method("chang_2012", "Chang 2012, q from bandwidth", CHANG, True, ("arw",), on_usable(rate_filters.chang_2012),
+           same_at_any_rate=_UNIT_GAIN, operations=operation_counts.low_passed),
     _conditional("ccc", "in_sample", f"{LIU}, a = b = 0"),
     _conditional("ccc", "causal", f"{LIU}, a = b = 0, carried forward"),
     _conditional("dcc", "in_sample", LIU),
@@ -110,32 +107,33 @@ _PAPERS = (
            operations=waegli_guerrier.operations, inferred=waegli_guerrier.INFERRED),
     Method("vaccaro_zaki", "Vaccaro & Zaki 2017, least drift", vaccaro_zaki.SOURCE, True, ("scales",),
            on_usable(vaccaro_zaki.vaccaro_zaki, needs_arw=False), same_at_any_rate=_FIXED,
-           operations=costs.weighted, inferred=vaccaro_zaki.INFERRED),
+           operations=operation_counts.weighted, inferred=vaccaro_zaki.INFERRED),
     Method("scale_wise_all", "Zhang 2022, all scales alike", scale_wise.SOURCE, True, ("scales",),
            on_usable(scale_wise.scale_wise_all, needs_arw=False), same_at_any_rate=_FIXED,
-           operations=costs.weighted, inferred=scale_wise.INFERRED_ALL),
+           operations=operation_counts.weighted, inferred=scale_wise.INFERRED_ALL),
     Method("scale_wise_large", "Zhang 2022, large scales", scale_wise.SOURCE, True, ("scales",),
            on_usable(scale_wise.scale_wise_large, needs_arw=False), same_at_any_rate=_FIXED,
-           operations=costs.weighted, inferred=scale_wise.INFERRED_LARGE),
+           operations=operation_counts.weighted, inferred=scale_wise.INFERRED_LARGE),
 )
 _OURS = (
-    Method("parity_weights", "Parity variances", OWN, False, (), parity_rows.parity_weights,
-           same_at_any_rate=_PARITY, family="ours", operations=costs.residuals),
-    Method("residual_weights", "Changing parity variances", OWN, False, (), parity_rows.residual_weights,
-           same_at_any_rate=_PARITY, family="ours", operations=costs.changing_residuals),
+    Method("parity_weights", "Parity variances", OWN, False, (), parity_weights.parity_weights,
+           same_at_any_rate=_PARITY, family="ours", operations=operation_counts.residuals),
+    Method("residual_weights", "Changing parity variances", OWN, False, (), parity_weights.residual_weights,
+           same_at_any_rate=_PARITY, family="ours", operations=operation_counts.changing_residuals),
     Method("frequency_weights", "Weights of each frequency", OWN, False, ("arw",),
-           on_usable(slow_rows.frequency_weights),
-           same_at_any_rate=_PARITY, family="ours", operations=costs.without_slow),
+           on_usable(frequency_weights.frequency_weights),
+           same_at_any_rate=_PARITY, family="ours", operations=operation_counts.without_slow),
     Method("parity_smoothed", "Parity variances, smoothed", OWN, False, (), smoothed.parity_smoothed,
-           same_at_any_rate=_SMOOTHED, family="ours", operations=costs.smoothed_average),
+           same_at_any_rate=_SMOOTHED, family="ours", operations=operation_counts.smoothed_average),
     Method("residual_smoothed", "Changing parity variances, smoothed", OWN, False, (), smoothed.residual_smoothed,
-           same_at_any_rate=_SMOOTHED, family="ours", operations=costs.smoothed_residuals),
+           same_at_any_rate=_SMOOTHED, family="ours", operations=operation_counts.smoothed_residuals),
     Method("dcc_smoothed", "DCC of the residual, smoothed", f"{OWN}; {LIU}", False, ("weights",),
-           smoothed.dcc_smoothed, same_at_any_rate=_SMOOTHED, family="ours", operations=costs.smoothed_average),
+           smoothed.dcc_smoothed, same_at_any_rate=_SMOOTHED, family="ours",
+           operations=operation_counts.smoothed_average),
     Method("recommended_unsmoothed", "Recommended, not smoothed", OWN, False, (), recommended.recommended_unsmoothed,
-           same_at_any_rate=_PARITY, family="ours", operations=costs.everything),
+           same_at_any_rate=_PARITY, family="ours", operations=operation_counts.everything),
     Method("recommended", "Recommended", OWN, False, (), recommended.recommended,
-           same_at_any_rate=_SMOOTHED, family="ours", operations=costs.everything_smoothed),
+           same_at_any_rate=_SMOOTHED, family="ours", operations=operation_counts.everything_smoothed),
 )
 _ALL = (*_BASELINES, *_PAPERS, *_OURS)
 # fmt: on

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vgyro.fusion.array import ArrayRates, FilterParameters, Fused
+from vgyro.fusion.types import ArrayRates, FilterParameters, Fused
 
 Fuse = Callable[[ArrayRates, FilterParameters], Fused]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vgyro.fusion.array import AllanScales, ArrayRates, CannotRun, FilterParameters
+from vgyro.fusion.types import AllanScales, ArrayRates, CannotRun, FilterParameters
 
 LONGEST_TAU = 4  # the longest τ is a fourth of the longest stretch: half of it then holds differences
 MOST_DIFFERENCES = 1 << 17

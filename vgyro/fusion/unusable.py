@@ -12,7 +12,7 @@ from functools import wraps
 
 import numpy as np
 
-from vgyro.fusion.array import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused
+from vgyro.fusion.types import ArrayNoise, ArrayRates, CannotRun, FilterParameters, Fused
 
 Fuse = Callable[[ArrayRates, FilterParameters], Fused]
 OF_GYROS = ("missing", "lowpass_hz")

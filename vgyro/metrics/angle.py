@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.metrics.coefficients import Coefficient
+from vgyro.metrics.allan.coefficients import Coefficient
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.sampling import Sampling
 

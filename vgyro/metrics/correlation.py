@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.metrics.allan import edges_of
+from vgyro.metrics.allan.deviation import edges_of
 
 LARGEST_LAG_SHARE = 4
 WINDOW_FACTOR = 5

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
-from vgyro.metrics.allan import stretches
+from vgyro.metrics.allan.deviation import stretches
 
 SETTLED = 8.0  # time constants after which a start is forgotten: e^-8 of it is left, e^-16 of its variance
 ALIKE = 1e-6

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from vgyro.metrics.bootstrap import percentile_limits, scale_limits
 from vgyro.metrics.figures import Reading
+from vgyro.metrics.intervals.bootstrap import percentile_limits, scale_limits
 
 NOT_SIGNIFICANT = "not significant"
 NOT_KNOWN = "the virtual gyro's figure is zero or not known"

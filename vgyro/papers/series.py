@@ -10,7 +10,7 @@ import numpy as np
 
 from vgyro.config import MetricsOptions
 from vgyro.metrics import FIGURES, LowPass, Reading, Sampling, make_units, resample
-from vgyro.metrics.static_figures import static_figures
+from vgyro.metrics.static.figures import static_figures
 
 Name = tuple[str, str]
 Rows = list[dict[str, Any]]

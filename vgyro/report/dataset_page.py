@@ -6,26 +6,26 @@ from typing import Any
 
 from markupsafe import Markup
 
-from vgyro.report.arch import ARCH_RULE
-from vgyro.report.best import BEST_RULES, Best, best_of_all
-from vgyro.report.conclusions import BAD_RULE, bad_gyros, conclude, main_arrays
-from vgyro.report.conventions import conventions_part, provenance_part
-from vgyro.report.crosscheck import crosscheck_part
-from vgyro.report.delays import delays_part
-from vgyro.report.failed import recommended_failed
-from vgyro.report.faults import FAULT_RULE, faults_part
+from vgyro.report.calibration.section import calibration_part, nominal
+from vgyro.report.conclusions.best import BEST_RULES, Best, best_of_all
+from vgyro.report.conclusions.conventions import conventions_part, provenance_part
+from vgyro.report.conclusions.crosscheck import crosscheck_part
+from vgyro.report.conclusions.section import BAD_RULE, bad_gyros, conclude, main_arrays
+from vgyro.report.fusion.failed import recommended_failed
+from vgyro.report.fusion.methods import dynamic_table, response_table, rest_tables
+from vgyro.report.fusion.more_gyros import more_gyros_part
+from vgyro.report.fusion.moved import MOVED_RULE, moved_table
+from vgyro.report.fusion.noise import allan_plot, cross_allan_plot, spectrum_plot, tones_table
 from vgyro.report.html import bullets, details, heading, join, macro, paragraph
-from vgyro.report.methods import dynamic_table, response_table, rest_tables
 from vgyro.report.model import ArrayPart, DatasetPart
-from vgyro.report.more_gyros import more_gyros_part
-from vgyro.report.moved import MOVED_RULE, moved_table
-from vgyro.report.noise import allan_plot, cross_allan_plot, spectrum_plot, tones_table
 from vgyro.report.page import Section, render_page
-from vgyro.report.recordings import recordings_part
-from vgyro.report.scale import calibration_part, nominal
+from vgyro.report.recordings.delays import delays_part
+from vgyro.report.recordings.faults import FAULT_RULE, faults_part
+from vgyro.report.recordings.section import recordings_part
+from vgyro.report.recordings.series import correlation_table, rates_plots, temperature_plot
 from vgyro.report.sentences import Conclusion
-from vgyro.report.series import correlation_table, rates_plots, temperature_plot
-from vgyro.report.volatility import volatility_part
+from vgyro.report.volatility.arch import ARCH_RULE
+from vgyro.report.volatility.section import volatility_part
 
 
 def render_dataset(dataset: DatasetPart) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from vgyro.report.best import FAIR
+from vgyro.report.conclusions.best import FAIR
 from vgyro.report.html import badge, join, link, paragraph
 from vgyro.report.model import Record
 from vgyro.report.numbers import MISSING, duration, significant

@@ -3,11 +3,11 @@
 from vgyro.simulate.calibration_truth import calibration_truth, repeatability_truth, thermal_truth
 from vgyro.simulate.check import check_against_board
 from vgyro.simulate.closed_form import allan_minimum, expected_allan
-from vgyro.simulate.dump import Dump, dump_of
-from vgyro.simulate.encode import encode_frames
-from vgyro.simulate.line import Damage, damage
 from vgyro.simulate.manifest import dump_name, manifest_of, manifest_yaml, reference_name
 from vgyro.simulate.recording import Simulated, simulate_pieces, simulate_recording
+from vgyro.simulate.serial.dump import Dump, dump_of
+from vgyro.simulate.serial.encode import encode_frames
+from vgyro.simulate.serial.line import Damage, damage
 from vgyro.simulate.twin import GyroTruth, Twin, lasting, parse_twin, truth_of
 
 __all__ = [

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from vgyro.board import Board
-from vgyro.simulate.encode import type_limits
 from vgyro.simulate.faults import Stretch
+from vgyro.simulate.serial.encode import type_limits
 
 
 class Converter:

@@ -9,7 +9,7 @@ from vgyro.board import Board
 from vgyro.config import IntegrityOptions
 from vgyro.dataset import Recording
 from vgyro.log import LogArray
-from vgyro.storage.dumps import CHUNK_BYTES, DumpReader
+from vgyro.storage.dumps.reader import CHUNK_BYTES, DumpReader
 from vgyro.storage.frames import Frames, Reader, gather
 from vgyro.storage.inputs import BOARDS
 

@@ -14,10 +14,10 @@ rule calibrate:
         mem_mb=2000,
         runtime=20,
     params:
-        options=stage("calibrate"),
-        code=code("calibrate"),
+        options=stage("calibration.calibrate"),
+        code=code("calibration.calibrate"),
     shell:
-        "python -m vgyro.tasks.calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"
+        "python -m vgyro.tasks.calibration.calibrate --input frames {input.frames:q} --input integrity {input.integrity:q}"
         " --input references {input.references:q} --output calibration {output.calibration}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -39,10 +39,10 @@ rule convert:
         mem_mb=3000,
         runtime=20,
     params:
-        options=stage("convert"),
-        code=code("convert"),
+        options=stage("rates.convert"),
+        code=code("rates.convert"),
     shell:
-        "python -m vgyro.tasks.convert --input frames {input.frames} --input integrity {input.integrity}"
+        "python -m vgyro.tasks.rates.convert --input frames {input.frames} --input integrity {input.integrity}"
         " --input calibration {input.calibration}"
         " --input reference {input.reference:q} --output rates {output.rates}"
         " --options {params.options:q} --code {params.code} --log {log}"
@@ -62,8 +62,8 @@ rule noise:
         mem_mb=1500,
         runtime=30,
     params:
-        options=stage("noise"),
-        code=code("noise"),
+        options=stage("fusion.noise"),
+        code=code("fusion.noise"),
     shell:
-        "python -m vgyro.tasks.noise --input rates {input.rates:q} --output noise {output.noise}"
+        "python -m vgyro.tasks.fusion.noise --input rates {input.rates:q} --output noise {output.noise}"
         " --options {params.options:q} --code {params.code} --log {log}"

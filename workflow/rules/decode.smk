@@ -14,10 +14,10 @@ rule decode:
         runtime=60,
     params:
         files=named_files,
-        options=stage("decode"),
-        code=code("decode"),
+        options=stage("rates.decode"),
+        code=code("rates.decode"),
     shell:
-        "python -m vgyro.tasks.decode --input files {params.files:q} --output frames {output.frames}"
+        "python -m vgyro.tasks.rates.decode --input files {params.files:q} --output frames {output.frames}"
         " --output integrity {output.integrity} --options {params.options:q} --code {params.code} --log {log}"
 
 
@@ -35,8 +35,8 @@ checkpoint screen:
         mem_mb=500,
         runtime=5,
     params:
-        options=stage("screen"),
-        code=code("screen"),
+        options=stage("rates.screen"),
+        code=code("rates.screen"),
     shell:
-        "python -m vgyro.tasks.screen --input integrity {input.integrity:q} --output screen {output.screen}"
+        "python -m vgyro.tasks.rates.screen --input integrity {input.integrity:q} --output screen {output.screen}"
         " --options {params.options:q} --code {params.code} --log {log}"

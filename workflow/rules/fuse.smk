@@ -13,10 +13,10 @@ rule faults:
         mem_mb=1500,
         runtime=30,
     params:
-        options=stage("faults"),
-        code=code("faults"),
+        options=stage("fusion.faults"),
+        code=code("fusion.faults"),
     shell:
-        "python -m vgyro.tasks.faults --input rates {input.rates} --input calibration {input.calibration}"
+        "python -m vgyro.tasks.fusion.faults --input rates {input.rates} --input calibration {input.calibration}"
         " --output faults {output.faults} --options {params.options:q} --code {params.code} --log {log}"
 
 
@@ -40,9 +40,9 @@ rule fuse:
         mem_mb=2500,
         runtime=60,
     params:
-        options=stage("fuse", injected_rate=injected_rate),
-        code=code("fuse"),
+        options=stage("fusion.fuse", injected_rate=injected_rate),
+        code=code("fusion.fuse"),
     shell:
-        "python -m vgyro.tasks.fuse --input rates {input.rates} --input noise {input.noise} --input weights {input.weights:q} --input moved {input.moved:q} --input faults {input.faults}"
+        "python -m vgyro.tasks.fusion.fuse --input rates {input.rates} --input noise {input.noise} --input weights {input.weights:q} --input moved {input.moved:q} --input faults {input.faults}"
         " --output fused {output.fused} --output methods {output.methods} --output moved {output.moved}"
         " --options {params.options:q} --code {params.code} --log {log}"

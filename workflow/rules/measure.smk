@@ -20,10 +20,10 @@ rule measure:
         mem_mb=2000,
         runtime=60,
     params:
-        options=stage("measure"),
-        code=code("measure"),
+        options=stage("figures.measure"),
+        code=code("figures.measure"),
     shell:
-        "python -m vgyro.tasks.measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods} --input moved {input.moved}"
+        "python -m vgyro.tasks.figures.measure --input rates {input.rates} --input fused {input.fused} --input methods {input.methods} --input moved {input.moved}"
         " --output allan {output.allan} --output spectrum {output.spectrum} --output metrics {output.metrics} --output correlation {output.correlation} --output cross_allan {output.cross_allan} --output tones {output.tones}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -50,9 +50,9 @@ rule crosscheck:
         mem_mb=2500,
         runtime=60,
     params:
-        options=stage("crosscheck"),
-        code=code("crosscheck"),
+        options=stage("figures.crosscheck"),
+        code=code("figures.crosscheck"),
     shell:
-        "python -m vgyro.tasks.crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input series {input.series:q} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
+        "python -m vgyro.tasks.figures.crosscheck --input rates {input.rates} --input noise {input.noise} --input fused {input.fused} --input methods {input.methods} --input allan {input.allan} --input series {input.series:q} --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
         " --output crosscheck {output.crosscheck}"
         " --options {params.options:q} --code {params.code} --log {log}"

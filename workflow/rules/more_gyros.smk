@@ -14,9 +14,9 @@ rule more_gyros:
         mem_mb=500,
         runtime=5,
     params:
-        options=stage("more_gyros"),
-        code=code("more_gyros"),
+        options=stage("fusion.more_gyros"),
+        code=code("fusion.more_gyros"),
     shell:
-        "python -m vgyro.tasks.more_gyros --input rates {input.rates} --input noise {input.noise} --input correlation {input.correlation}"
+        "python -m vgyro.tasks.fusion.more_gyros --input rates {input.rates} --input noise {input.noise} --input correlation {input.correlation}"
         " --output more_gyros {output.more_gyros}"
         " --options {params.options:q} --code {params.code} --log {log}"

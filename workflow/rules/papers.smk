@@ -17,10 +17,10 @@ rule papers_page:
         mem_mb=4000,
         runtime=20,
     params:
-        options=stage("papers"),
-        code=code("papers"),
+        options=stage("papers.papers"),
+        code=code("papers.papers"),
     shell:
-        "python -m vgyro.tasks.papers --input calibration {input.calibration} --input noise {input.noise:q}"
+        "python -m vgyro.tasks.papers.papers --input calibration {input.calibration} --input noise {input.noise:q}"
         " --input artefacts {input.artefacts:q} --output page {output.page}"
         " --output table1 {output.table1} --output table2 {output.table2} --output table3 {output.table3}"
         " --options {params.options:q} --code {params.code} --log {log}"

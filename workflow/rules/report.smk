@@ -17,10 +17,10 @@ rule report:
         mem_mb=1500,
         runtime=20,
     params:
-        options=stage("report"),
-        code=code("report"),
+        options=stage("pages.report"),
+        code=code("pages.report"),
     shell:
-        "python -m vgyro.tasks.report --input calibration {input.calibration} --input screen {input.screen}"
+        "python -m vgyro.tasks.pages.report --input calibration {input.calibration} --input screen {input.screen}"
         " --input integrity {input.integrity:q} --input noise {input.noise:q} --input artefacts {input.artefacts:q}"
         " --output page {output.page} --output headline {output.headline}"
         " --options {params.options:q} --code {params.code} --log {log}"
@@ -41,9 +41,9 @@ rule index:
         runtime=5,
     params:
         options=json.dumps({"problems": PROBLEMS}),
-        code=code("index"),
+        code=code("pages.index"),
     shell:
-        "python -m vgyro.tasks.index --input headlines {input.headlines:q} --output page {output.page}"
+        "python -m vgyro.tasks.pages.index --input headlines {input.headlines:q} --output page {output.page}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
 

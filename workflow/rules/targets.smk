@@ -119,7 +119,7 @@ def index_command():
     there = [path for path in headlines if Path(path).exists()]
     return " ".join(
         [
-            "python -m vgyro.tasks.index --input headlines",
+            "python -m vgyro.tasks.pages.index --input headlines",
             *map(shlex.quote, there),
             "--output page reports/index.html",
         ]

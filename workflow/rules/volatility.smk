@@ -12,10 +12,10 @@ rule series:
         mem_mb=1000,
         runtime=20,
     params:
-        options=stage("series"),
-        code=code("series"),
+        options=stage("volatility.series"),
+        code=code("volatility.series"),
     shell:
-        "python -m vgyro.tasks.series --input rates {input.rates} --output series {output.series}"
+        "python -m vgyro.tasks.volatility.series --input rates {input.rates} --output series {output.series}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
 
@@ -41,10 +41,10 @@ rule volatility_chunk:
         mem_mb=1000,
         runtime=480,
     params:
-        options=stage("volatility_chunk", injected_rate=injected_rate),
-        code=code("volatility_chunk"),
+        options=stage("volatility.chunk", injected_rate=injected_rate),
+        code=code("volatility.chunk"),
     shell:
-        "python -m vgyro.tasks.volatility_chunk --input series {input.series}"
+        "python -m vgyro.tasks.volatility.chunk --input series {input.series}"
         " --output garch {output.garch} --output dcc {output.dcc} --output weights {output.weights}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -70,10 +70,10 @@ rule volatility:
         mem_mb=1500,
         runtime=480,
     params:
-        options=stage("volatility", injected_rate=injected_rate),
-        code=code("volatility"),
+        options=stage("volatility.assemble", injected_rate=injected_rate),
+        code=code("volatility.assemble"),
     shell:
-        "python -m vgyro.tasks.volatility --input series {input.series}"
+        "python -m vgyro.tasks.volatility.assemble --input series {input.series}"
         " --input garch {input.garch:q} --input dcc {input.dcc:q} --input weights {input.weights:q}"
         " --output garch {output.garch} --output dcc {output.dcc} --output arch_lm {output.arch_lm}"
         " --output weights {output.weights} --output fits {output.fits}"
@@ -96,10 +96,10 @@ rule bekk:
         mem_mb=1000,
         runtime=60,
     params:
-        options=stage("bekk"),
-        code=code("bekk"),
+        options=stage("volatility.bekk"),
+        code=code("volatility.bekk"),
     shell:
-        "python -m vgyro.tasks.bekk --input series {input.series}"
+        "python -m vgyro.tasks.volatility.bekk --input series {input.series}"
         " --input garch {input.garch:q} --input dcc {input.dcc:q} --output bekk {output.bekk}"
         " --options {params.options:q} --code {params.code} --log {log}"
 
@@ -120,9 +120,9 @@ rule effects:
         mem_mb=1500,
         runtime=60,
     params:
-        options=stage("effects", definition="level"),
-        code=code("effects"),
+        options=stage("volatility.effects", definition="level"),
+        code=code("volatility.effects"),
     shell:
-        "python -m vgyro.tasks.effects --input series {input.series} --input tones {input.tones}"
+        "python -m vgyro.tasks.volatility.effects --input series {input.series} --input tones {input.tones}"
         " --input garch {input.garch:q} --output effects {output.effects}"
         " --options {params.options:q} --code {params.code} --log {log}"

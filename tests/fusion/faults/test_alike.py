@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vgyro.fusion.faults.alike import of_the_array
 from vgyro.fusion.faults.candidate import Candidate
-from vgyro.fusion.faults.wander import Slow
+from vgyro.fusion.faults.levels.alike import of_the_array
+from vgyro.fusion.faults.levels.drift_variance import Slow
 
 BLOCKS, LENGTH, GYROS = 400, 150, 6
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import ArrayNoise, ArrayRates
-from vgyro.fusion.faults.dead import find_dead
+from vgyro.fusion.faults.samples.no_rate import find_dead
 
 RATE_HZ, SAMPLES = 100.0, 6000
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vgyro.config import FaultOptions
-from vgyro.fusion.faults.change import lasting_change
-from vgyro.fusion.faults.health import FLICKERS, WALKS, covariances, healthy_array, likelihood_of
-from vgyro.fusion.faults.wander import Slow
+from vgyro.fusion.faults.levels.change import lasting_change
+from vgyro.fusion.faults.levels.drift_variance import Slow
+from vgyro.fusion.faults.levels.health import FLICKERS, WALKS, covariances, healthy_array, likelihood_of
 from vgyro.simulate.noise import UnitRandomWalk, unit_flicker
 
 BLOCKS, GYROS = 1200, 6

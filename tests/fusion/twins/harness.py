@@ -19,15 +19,15 @@ from vgyro.board import Board
 from vgyro.config import FusionOptions, MetricsOptions, VolatilityOptions
 from vgyro.dataset import AT_REST
 from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters, Fused, SampleWeights, block_of_sample
-from vgyro.fusion.array import WeightKey
 from vgyro.fusion.registry import run_methods, select
+from vgyro.fusion.types import WeightKey
 from vgyro.metrics import Sampling
 from vgyro.simulate import Simulated, Twin, parse_twin, simulate_recording, truth_of
 from vgyro.simulate.noise import correlation_matrix, pole_of_motion
 from vgyro.simulate.twin import pole_of
 from vgyro.storage.inputs import read_board
-from vgyro.tasks.noise import noise_at_rest, record_of
-from vgyro.tasks.noise_record import noise_of_record
+from vgyro.tasks.fusion.noise import noise_at_rest, record_of
+from vgyro.tasks.fusion.noise_record import noise_of_record
 from vgyro.volatility import block_means
 from vgyro.volatility.fits import fit_windows, window_models
 from vgyro.volatility.rolling import weights_of_windows

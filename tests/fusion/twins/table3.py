@@ -9,7 +9,7 @@ from harness import Case
 
 from vgyro.fusion import Fused
 from vgyro.metrics import Equaliser, LowPass, allan_deviation, dynamic_errors, noise_coefficients, read_curve
-from vgyro.metrics.readings import bias_drift
+from vgyro.metrics.static.readings import bias_drift
 from vgyro.units import arw_deg_rt_h
 
 LIU = ("mean", "sigma", "arw", "bias_drift")

@@ -16,10 +16,10 @@ from benchmarks.mimu import AXES, CAPTURES, LONG_S, RATE_HZ, SCALE
 from vgyro.calibration import find_rest
 from vgyro.config import MetricsOptions
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
-from vgyro.fusion.parity import parity_variances
-from vgyro.fusion.parity_band import in_band
+from vgyro.fusion.noise.band import in_band
+from vgyro.fusion.noise.parity import parity_variances
 from vgyro.metrics import Sampling
-from vgyro.tasks.noise import noise_at_rest, record_of
+from vgyro.tasks.fusion.noise import noise_at_rest, record_of
 
 PASSED_HZ = 1.2
 """Noise bandwidth of the smoother at rest, of 1 Hz."""
@@ -52,7 +52,7 @@ def array_of(half: list[np.ndarray], gyros: list[str]) -> ArrayRates:
 
 def weights_of(array: ArrayRates) -> dict[str, np.ndarray]:
     """Fixed weights [N] of four methods, from one half."""
-    from vgyro.fusion.recommended import static_weights
+    from vgyro.fusion.ours.recommended import static_weights
 
     inverse = array.noise.arw**-2.0
     ours = static_weights(array, FilterParameters())

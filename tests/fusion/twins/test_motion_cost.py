@@ -9,8 +9,8 @@ from __future__ import annotations
 import pytest
 
 from tests.fusion.twins import harness
-from vgyro.fusion.analysed import shared_motion
-from vgyro.fusion.motion_evidence import Spectrum
+from vgyro.fusion.motion.evidence import Spectrum
+from vgyro.fusion.ours.array_estimate import shared_motion
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter, ss2tf
 
-from vgyro.fusion.smoother import Smoothed, choose_motion, smooth
+from vgyro.fusion.motion.smoother import Smoothed, choose_motion, smooth
 
 SETTLED = 400
 """Samples left out of the likelihood, while the filter forgets its start."""

@@ -10,7 +10,7 @@ import pytest
 from bag_bytes import CUSTOM, EPOCH, store, write_bag
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.bag import open_log
+from vgyro.storage.logs.binary.bag import open_log
 
 RATES = np.random.default_rng(1).normal(size=(200, 3))
 AXES = [f"angular_velocity.{axis}" for axis in "xyz"]
@@ -160,7 +160,7 @@ def test_a_damaged_message_is_a_bad_row(bag):
 
 
 def test_long_bags_are_streamed(tmp_path, monkeypatch):
-    monkeypatch.setattr("vgyro.storage.logs.bag.MESSAGES", 500)
+    monkeypatch.setattr("vgyro.storage.logs.binary.bag.MESSAGES", 500)
     folder = write_bag(tmp_path / "log", "mcap", np.zeros((4000, 3)))
     log = open_log(folder)
     tracemalloc.start()

@@ -15,7 +15,7 @@ from scipy.io import savemat
 from ulog_bytes import FIFO, GYRO, SYNC, dropout, fifo, gyro, head, subscribed
 
 from vgyro.log import Log
-from vgyro.storage.logs import bag, matlab, numpy_file, parquet, ulog
+from vgyro.storage.logs.binary import bag, matlab, numpy_file, parquet, ulog
 from vgyro.storage.logs.families import open_log
 
 RNG = np.random.default_rng(1)

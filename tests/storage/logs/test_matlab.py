@@ -9,7 +9,7 @@ import pytest
 from scipy.io import loadmat, savemat
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.matlab import open_log
+from vgyro.storage.logs.binary.matlab import open_log
 
 T = 1000
 RNG = np.random.default_rng(1)

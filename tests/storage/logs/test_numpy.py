@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.numpy_file import open_log
+from vgyro.storage.logs.binary.numpy_file import open_log
 
 RNG = np.random.default_rng(1)
 

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.parquet import open_log
+from vgyro.storage.logs.binary.parquet import open_log
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pyulog import ULog
 from ulog_bytes import COMBINED, FIFO, GYRO, SYNC, data, dropout, fifo, gyro, head, message, subscribed
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.ulog import open_log
+from vgyro.storage.logs.binary.ulog import open_log
 
 RATES = np.float32(np.random.default_rng(1).normal(size=(200, 3)))
 START = head(GYRO, COMBINED, FIFO) + subscribed(0, "sensor_gyro") + subscribed(1, "sensor_gyro", 1)

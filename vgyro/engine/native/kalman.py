@@ -112,7 +112,7 @@ def settling_filter(signal: np.ndarray, keep: float, fading: float, start: float
     y_k = φ_k·y_{k-1} + (1 - φ_k)·signal_k, φ_k = keep·(1 - f_k)/(1 - f_{k+1}), f_k = fading·keep^(2k), y_{-1} = start.
     keep : e^(-aT);  fading : c = (P0 - P∞)/(P0 + P∞)
     raises : EngineError that names the first sample that is not finite
-    Xue et al. (2012), Measurement 45, 745-754; see vgyro.fusion.filters.xue_2012.
+    Xue et al. (2012), Measurement 45, 745-754; see vgyro.fusion.papers.rate_filters.xue_2012.
     """
     return _run(signal, _kalman.settling, keep, fading, start)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.faults.candidate import NORMAL_MEDIAN
+from vgyro.fusion.types import ArrayRates
 
 FEWEST_SAMPLES = 8  # in a block, so that it has a variance
 PIECE = 1 << 15

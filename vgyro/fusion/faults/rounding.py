@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.fusion.quantised import lasting_variance, least_variance, noise_before
+from vgyro.fusion.samples.quantised import lasting_variance, least_variance, noise_before
 
 COARSE = 0.25
 """Steps are coarse where the variance of rounding is so much of a gyro's."""

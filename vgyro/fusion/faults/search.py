@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro.config import FaultOptions
-from vgyro.fusion.array import ArrayRates
 from vgyro.fusion.events import FaultEvent, FaultKind
 from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums, silent_share
 from vgyro.fusion.faults.candidate import Candidate
-from vgyro.fusion.faults.samples import Looked, look_at_samples
+from vgyro.fusion.faults.levels.temperature import block_temperature
+from vgyro.fusion.faults.samples.found import Looked, look_at_samples
 from vgyro.fusion.faults.state import BIAS_KINDS, NOISE_KINDS, State
-from vgyro.fusion.faults.warmth import block_temperature
-from vgyro.fusion.quantised import steps
+from vgyro.fusion.samples.quantised import steps
+from vgyro.fusion.types import ArrayRates
 
 FEWEST_GYROS = 3
 FEWEST_BLOCKS = 20

@@ -9,18 +9,18 @@ import numpy as np
 
 from vgyro.config import FaultOptions
 from vgyro.fusion.events import FAULT_KINDS
-from vgyro.fusion.faults.alike import of_the_array
-from vgyro.fusion.faults.bias import suspect_bias
 from vgyro.fusion.faults.block_sums import BlockSums
 from vgyro.fusion.faults.candidate import Candidate
-from vgyro.fusion.faults.health import healthy_array
-from vgyro.fusion.faults.lag import without_lag
+from vgyro.fusion.faults.levels.alike import of_the_array
+from vgyro.fusion.faults.levels.bias import suspect_bias
+from vgyro.fusion.faults.levels.drift_variance import Slow, local_variance, slow_part
+from vgyro.fusion.faults.levels.health import healthy_array
+from vgyro.fusion.faults.levels.lag import without_lag
+from vgyro.fusion.faults.levels.temperature import without_temperature
 from vgyro.fusion.faults.noise import NoiseLevel, mean_level, noise_level, ratio_of, suspect_noise
 from vgyro.fusion.faults.residuals import Residuals, Spoilt, common_ratio, residuals_of, spans_of, usual_variance
 from vgyro.fusion.faults.rounding import rounding_of
 from vgyro.fusion.faults.scale import FEWEST_BLOCKS, LEAST_CHANGE, relative_gain, slope_in, suspect_scale
-from vgyro.fusion.faults.wander import Slow, local_variance, slow_part
-from vgyro.fusion.faults.warmth import without_temperature
 
 MOST_ROUNDS = 100
 GAIN_ROUNDS = 2

@@ -43,31 +43,31 @@ class Family:
 
 # A reader is imported when it is needed, and by its name as it stands, so that an edit of it re-runs what it read.
 def _open_parquet(path: Path, _: Log, __: str) -> LogFile:
-    from vgyro.storage.logs import parquet
+    from vgyro.storage.logs.binary import parquet
 
     return parquet.open_log(path)
 
 
 def _open_ulog(path: Path, _: Log, __: str) -> LogFile:
-    from vgyro.storage.logs import ulog
+    from vgyro.storage.logs.binary import ulog
 
     return ulog.open_log(path)
 
 
 def _open_bag(path: Path, _: Log, __: str) -> LogFile:
-    from vgyro.storage.logs import bag
+    from vgyro.storage.logs.binary import bag
 
     return bag.open_log(path)
 
 
 def _open_numpy(path: Path, _: Log, __: str) -> LogFile:
-    from vgyro.storage.logs import numpy_file
+    from vgyro.storage.logs.binary import numpy_file
 
     return numpy_file.open_log(path)
 
 
 def _open_matlab(path: Path, _: Log, __: str) -> LogFile:
-    from vgyro.storage.logs import matlab
+    from vgyro.storage.logs.binary import matlab
 
     return matlab.open_log(path)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from vgyro.storage.logs.opened import Unique
+from vgyro.storage.logs.binary.opened import Unique
 from vgyro.storage.logs.text.cells import is_value, missing, split
 from vgyro.storage.logs.text.delimiter import DELIMITERS
 

@@ -1,0 +1,89 @@
+"""What is known of the constants beforehand: the centre of the biases, seen or not, against dense algebra and truth."""
+
+import numpy as np
+import pytest
+
+from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
+from vgyro.fusion.bias.blocks import SlowBlocks
+from vgyro.fusion.bias.estimate import slow_errors, slow_variance
+from vgyro.fusion.bias.model import Evidence, Walk
+from vgyro.fusion.bias.prior import Prior
+
+MOVING = FilterParameters(in_motion=True)
+GYROS, SECONDS, TAU = 6, 600, 30.0
+ARW, RRW = np.full(GYROS, 0.02), np.full(GYROS, 0.003)
+EQUAL = np.full(GYROS, 1 / GYROS)
+REST = np.zeros(SECONDS, dtype=bool)
+REST[:60], REST[270:330], REST[-60:] = True, True, True
+
+
+def recording(seed, centre, spread, at_rest=REST, slope=0.0):
+    """A recording at 1 Hz whose biases are near one centre and walk, fading in TAU; true biases [T, N]."""
+    rng = np.random.default_rng(seed)
+    fade = np.exp(-1.0 / TAU)
+    sd = RRW[0] * np.sqrt(TAU / 2)
+    walk = np.empty((SECONDS, GYROS))
+    walk[0] = sd * rng.standard_normal(GYROS)
+    for second in range(1, SECONDS):
+        walk[second] = fade * walk[second - 1] + sd * np.sqrt(1 - fade**2) * rng.standard_normal(GYROS)
+    degrees = 20.0 + 10.0 * (1.0 - np.exp(-np.arange(SECONDS) / 200.0))
+    slopes = slope * (1.0 + 0.05 * rng.standard_normal(GYROS))
+    bias = centre + spread * rng.standard_normal(GYROS) + walk + slopes * (degrees - degrees.mean())[:, None]
+    motion = np.where(at_rest, 0.0, 20.0 * np.sin(np.arange(SECONDS) / 3.0))
+    rate = bias + motion[:, None] + ARW * rng.standard_normal((SECONDS, GYROS))
+    noise = ArrayNoise(ARW, RRW, np.eye(GYROS))
+    temperature = degrees if slope else None
+    return ArrayRates(rate, 1.0, np.zeros(SECONDS, dtype=int), at_rest, noise, temperature=temperature), bias
+
+
+def errors(seeds, **more):
+    """Mean error of the common bias [S], deg/s, and error²/variance of it in the motion [S]."""
+    means, ratios = [], []
+    for seed in seeds:
+        array, bias = recording(seed, **more)
+        slow = slow_errors(array, MOVING, ARW**2, walk=Walk(RRW, TAU))
+        error = (slow.bias - bias) @ EQUAL
+        means.append(error.mean())
+        ratios.append(np.mean((error**2 / slow_variance(EQUAL, slow))[~array.at_rest]))
+    return np.array(means), np.array(ratios)
+
+
+def test_sums_of_variables_against_the_dense_posterior():
+    # Expected: the normal posterior with the prior covariance of the sums, SVS', by dense algebra.
+    array, _ = recording(1, 0.3, 0.01)
+    blocks = SlowBlocks.of(array)
+    evidence = Evidence.of(array, blocks, np.tile(ARW**2, (len(blocks), 1)), np.eye(GYROS), REST, None)
+    filtered = evidence.filtered(evidence.information(), Walk(RRW, TAU))
+    sums = np.column_stack([np.eye(GYROS), np.ones(GYROS)])
+    variance = np.array([0.1, 0.2, 0.3, 0.1, 0.2, 0.3, 4.0])
+    found = Prior(np.ones(1), variance[None], sums).posterior(filtered)
+    before = np.linalg.inv(sums @ np.diag(variance) @ sums.T)
+    covariance = np.linalg.inv(before + filtered.squares[1:, 1:])
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-9)
+    np.testing.assert_allclose(found.mean, covariance @ filtered.squares[1:, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("centre", [0.0, 0.3, -20.0])
+def test_standstill_shows_the_centre_however_far_and_close_together(centre):
+    # Truth: six biases within 0.001 deg/s of a centre that may be far from zero. Expected: errors about zero (t below
+    # 3.5), and as large as stated (NEES of 1 within 3.5 standard errors) over 80 recordings.
+    means, ratios = errors(range(80), centre=centre, spread=0.001)
+    assert abs(means.mean()) < 3.5 * means.std(ddof=1) / np.sqrt(len(means))
+    assert abs(ratios.mean() - 1.0) < 3.5 * ratios.std(ddof=1) / np.sqrt(len(ratios))
+
+
+def test_standstill_shows_what_all_gyros_follow_the_temperature():
+    # Truth: six slopes within 5 % of 0.01 deg/s/K. Expected: as above.
+    means, ratios = errors(range(80), centre=0.1, spread=0.01, slope=0.01)
+    assert abs(means.mean()) < 3.5 * means.std(ddof=1) / np.sqrt(len(means))
+    assert abs(ratios.mean() - 1.0) < 3.5 * ratios.std(ddof=1) / np.sqrt(len(ratios))
+
+
+def test_without_standstill_the_centre_is_zero():
+    # Expected: what all gyros share goes to the motion: the biases found do not depend on the centre.
+    moving = np.zeros(SECONDS, dtype=bool)
+    found = []
+    for centre in (0.0, 0.3):
+        array, _ = recording(3, centre, 0.01, moving)
+        found.append(slow_errors(array, MOVING, ARW**2, walk=Walk(RRW, TAU)).bias)
+    np.testing.assert_allclose(found[1], found[0], atol=1e-9)

@@ -1,0 +1,1 @@
+"""Drafts of manifests: what is in the files, and dataset.yaml from it."""

@@ -1,0 +1,1 @@
+"""Baselines: what every method must beat. Fixed weights, and weights from second moments."""

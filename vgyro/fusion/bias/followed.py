@@ -1,0 +1,140 @@
+"""What the biases follow beside their random walks: the temperature, or a warm-up that settles.
+
+Both are regressors with one coefficient a gyro, chosen with the walks by the likelihood (vgyro.fusion.bias.choice).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.fusion.bias.blocks import SlowBlocks
+from vgyro.fusion.bias.choice import Choice, choose, quick_gains
+from vgyro.fusion.bias.common_walk import common_walk
+from vgyro.fusion.bias.model import Evidence, Walk
+from vgyro.fusion.types import ArrayRates, FilterParameters, TemperatureAtRest
+
+CONTRADICTED = "the differences contradict the temperature coefficients of the record at rest: these are not used"
+LEAST_RANGE = 1.0
+"""Range of the temperature, K, from which the biases may be regressed on it."""
+FEWEST = 60
+"""Blocks from which a warm-up is looked for."""
+SETTLED = (3.0, 6.0, 12.0)
+"""A warm-up settles with the time constant of the recording over one of these."""
+PROMISING = 3.0
+"""Units of ln(blocks) by which 2Δ log likelihood may be below that of the walks alone, before its own are chosen."""
+DRIFTING = 4.0
+"""Units of ln(blocks) by which 2Δ log likelihood of the walks is above those of the record: then one is looked for."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The model of the biases.
+
+    regressor : [B], K or 1, what the slopes are multiplied by; None: nothing was looked for
+    reference : temperature at which it is zero, °C;  settles_s : time constant of a warm-up, s; NaN: it is none
+    known     : what a record at rest knows of the slopes, where it is used;  common : variance of a walk all share
+    note      : what was not looked for, or not believed
+    """
+
+    evidence: Evidence
+    choice: Choice
+    common: float
+    regressor: np.ndarray | None = None
+    reference: float = 0.0
+    known: TemperatureAtRest | None = None
+    settles_s: float = math.nan
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One recording.
+
+    variance : [B, N] of a sample;  correlation : [N, N] of the noise;  resting : [B], blocks at rest for certain
+    arw      : [N], about;  walk : the random walks; None: they are chosen
+    """
+
+    array: ArrayRates
+    parameters: FilterParameters
+    blocks: SlowBlocks
+    variance: np.ndarray
+    correlation: np.ndarray
+    resting: np.ndarray
+    arw: np.ndarray
+    walk: Walk | None = None
+
+    def followed(self) -> Followed:
+        """The model that the likelihood prefers."""
+        degrees, why_not = blocks_temperature(self.array, self.blocks)
+        off = self.parameters.temperature == "off" or not self.parameters.has("temperature")
+        if self.array.temperature is not None and off:
+            degrees, why_not = None, "temperature is off"
+        if degrees is None:
+            return self._or_warm_up(self._fit(None, note=why_not))
+        centre = float(np.average(degrees, weights=self.blocks.length))
+        known = None if self.array.at_rest.all() else self.array.noise.temperature
+        if known is not None:
+            found = self._fit(degrees - known.nulled, known.nulled, known)
+            if found.choice.slopes:
+                return found
+            return self._fit(degrees - centre, centre, note=CONTRADICTED)
+        return self._fit(degrees - centre, centre)
+
+    def _fit(
+        self,
+        regressor: np.ndarray | None,
+        reference: float = 0.0,
+        known: TemperatureAtRest | None = None,
+        settles_s: float = math.nan,
+        note: str = "",
+    ) -> Followed:
+        noise = self.array.noise
+        scales = noise.scales if known is None or known.scales is None else known.scales
+        common = common_walk(scales) if self.parameters.has("slow_common") else 0.0
+        evidence = self._evidence(regressor, common, known)
+        choice = choose(evidence, self.blocks, noise.rrw, self.arw, self.walk)
+        return Followed(evidence, choice, common, regressor, reference, known, settles_s, note)
+
+    def _evidence(self, regressor: np.ndarray | None, common: float, known: TemperatureAtRest | None) -> Evidence:
+        return Evidence.of(
+            self.array, self.blocks, self.variance, self.correlation, self.resting, regressor, common, known
+        )
+
+    def _or_warm_up(self, plain: Followed) -> Followed:
+        """The likeliest warm-up where the walks alone are far from those of the record, and it is likelier than they.
+
+        It costs its time constant beside the coefficients' variance: ln(blocks) each (BIC).
+        """
+        price = math.log(len(self.blocks))
+        short = len(self.blocks) < FEWEST
+        steady = plain.choice.walk.gain < DRIFTING * price
+        if self.walk is not None or short or steady or not self.parameters.has("warm_up"):
+            return plain
+        since = self.blocks.time - self.blocks.time[0]
+        times = [float(since[-1]) / part for part in SETTLED]
+        others = [self._evidence(np.exp(-since / tau), plain.common, None) for tau in times]
+        walk, rrw = plain.choice.walk, self.array.noise.rrw
+        gains = quick_gains(plain.evidence, walk, others, self.blocks, rrw, self.arw)
+        if max(gains) < -PROMISING * price:
+            return plain
+        tau = times[int(np.argmax(gains))]
+        found = self._fit(np.exp(-since / tau), settles_s=tau)
+        likelier = found.choice.slopes and found.choice.slopes_gain > found.choice.needed + price
+        return found if likelier else plain
+
+
+def blocks_temperature(array: ArrayRates, blocks: SlowBlocks) -> tuple[np.ndarray | None, str]:
+    """Temperature of the blocks [B], °C, where it can be regressed on; else None and why."""
+    if array.temperature is None:
+        return None, ""
+    degrees = blocks.mean(array.temperature)
+    known = np.isfinite(degrees)
+    if not known.all():
+        return None, f"temperature unknown in {int((~known).sum())} of {len(known)} blocks: not regressed on"
+    span = float(np.ptp(degrees))
+    if span <= LEAST_RANGE:
+        return None, f"temperature within {span:.2g} K: not regressed on"
+    return degrees, ""

@@ -1,0 +1,1 @@
+"""Noise with heavy tails: its density, and how much each sample counts."""

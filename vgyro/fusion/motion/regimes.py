@@ -1,0 +1,130 @@
+"""What leads from one sample to the next where the rate is livelier or calmer, stands still, or jumps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.errors import DataError
+from vgyro.fusion.motion.models import Activity, Dynamics, Motion
+
+JUMP = 5.0
+"""Means on both sides that differ by so many standard deviations: a jump."""
+
+
+@dataclass(frozen=True)
+class Regimes:
+    """M ways from one sample to the next of n states.
+
+    transition, process : F and Q [M, n, n];  of_step [T] of uint8 : which of them leads to each sample
+    calibration [K], of_sample [T] : what the variance of the smoothed rate is multiplied by at each sample
+    """
+
+    transition: np.ndarray
+    process: np.ndarray
+    of_step: np.ndarray
+    calibration: np.ndarray
+    of_sample: np.ndarray
+
+    @classmethod
+    def of(cls, motion: Motion, dynamics: Dynamics, samples: int, activity: Activity | None) -> Regimes:
+        """One for each level of the process noise. The calibration is that of a model that holds throughout."""
+        levels = activity or Activity.even(samples)
+        F = np.stack([dynamics.transition] * len(levels.factor))
+        # A line is as narrow as it is.
+        own = np.arange(len(dynamics.reads)) < len(dynamics.reads) - 2 * len(motion.lines)
+        Q = np.where(np.outer(own, own), levels.factor[:, None, None], 1.0) * dynamics.process
+        calibration = np.full(len(F), motion.calibration if activity is None else 1.0)
+        return cls(F, Q, levels.level, calibration, levels.level)
+
+    def with_rest(
+        self,
+        motion: Motion,
+        dynamics: Dynamics,
+        at_rest: np.ndarray,
+        rest: Motion,
+        density: float,
+        jumps: np.ndarray,
+        free: float,
+    ) -> Regimes:
+        """At rest [T] the rate is the random walk `rest`; to the samples `jumps` it may go anywhere.
+
+        density : of the noise, deg²/s;  free : variance of a step that may go anywhere, (deg/s)²
+        """
+        still, slowed = _at_rest(dynamics, motion, rest, density)
+        freed = slowed.copy()
+        freed[0, 0] += free
+        of_sample = np.where(at_rest, len(self.calibration), self.of_sample).astype(np.uint8)
+        of_step = np.where(at_rest, len(self.transition), self.of_step).astype(np.uint8)
+        of_step[jumps] = len(self.transition) + 1
+        return Regimes(
+            np.concatenate([self.transition, [still, still]]),
+            np.concatenate([self.process, [slowed, freed]]),
+            of_step,
+            np.append(self.calibration, rest.calibration),
+            of_sample,
+        )
+
+
+def jumps_at_ends(
+    z: np.ndarray, r: np.ndarray, segment: np.ndarray, phi: float, at_rest: np.ndarray, size: int
+) -> np.ndarray:
+    """First samples [J] after those ends of standstill at which the rate jumps.
+
+    z, r, segment, phi, at_rest : as in vgyro.fusion.motion.smoother.smooth
+    size : samples on both sides that are compared
+    """
+    ends = np.flatnonzero((np.diff(at_rest.astype(np.int8)) != 0) & (np.diff(segment) == 0)) + 1
+    r = np.broadcast_to(r, z.shape)
+    found = []
+    for end in ends.tolist():
+        sides = slice(max(end - size, 0), end), slice(end, end + size)
+        told = [np.isfinite(r[side]) for side in sides]
+        if not all(one.any() for one in told):
+            continue
+        means = [float(z[side][one].mean()) for side, one in zip(sides, told, strict=True)]
+        noise = sum(float(r[side][one].mean()) / one.sum() for side, one in zip(sides, told, strict=True))
+        if (means[1] - means[0]) ** 2 > JUMP**2 * noise * (1.0 + phi) / (1.0 - phi):
+            found.append(end)
+    return np.array(found, dtype=np.int64)
+
+
+def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition and process of a step to a sample at rest, of the states of `motion`.
+
+    The rate as a whole goes on as the random walk `rest`, and its lines as they are; derivatives and oscillation end,
+    and begin about zero with what the filter of white noise of this density (deg²/s) knows of them while it moves.
+    """
+    if rest.model != "random_walk":
+        raise DataError(f"the rate at rest is a random walk, not {rest.model}")
+    states = len(dynamics.reads) - 2 * len(motion.lines)
+    F, Q = dynamics.transition.copy(), dynamics.process.copy()
+    F[:states, :states], Q[:states, :states] = np.eye(states), 0.0
+    Q[0, 0] = rest.parameters["q"] / rest.rate_hz
+    if motion.model in ("acceleration", "jerk", "oscillator"):
+        F[1:states, :states] = 0.0
+        F[0, :states] = dynamics.reads[:states]
+        Q[1:states, 1:states] = np.diag(_known_derivatives(motion, dynamics, density)[1:states])
+    return F, Q
+
+
+def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np.ndarray:
+    """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
+
+    With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero;
+    of two of them all that is known is how large the derivatives are.
+    """
+    values = motion.parameters
+    if "second_hz" in values:
+        return np.diagonal(dynamics.stationary)
+    if motion.model == "oscillator":
+        q = 4.0 * values["damping"] * (2.0 * math.pi * values["frequency_hz"]) ** 3 * values["sd"] ** 2
+        factors = np.array([0.0, 0.0, math.sqrt(2.0)])
+    else:
+        q = values["q"]
+        factors = np.array([2.0, 3.0, 2.0]) if motion.model == "jerk" else np.full(2, math.sqrt(2.0))
+    w = (q / density) ** (1.0 / (6.0 if motion.model == "jerk" else 4.0))
+    order = dynamics.order
+    return density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)

@@ -1,0 +1,247 @@
+"""The models of the rate that smooth best: starts on a grid, then Gauss and Newton with Levenberg's damping.
+
+Everything is in closed form on some hundred bands of one spectrum: a try costs microseconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vgyro.fusion.motion.density import FAMILIES, LINE, PAIR, Family, of_line, pair_power
+from vgyro.fusion.motion.evidence import Spectrum
+from vgyro.fusion.motion.models import Line
+
+PRICE = 4.0
+"""What a parameter costs, in units of the noise: 2 for the fall of the estimated risk with it where there is nothing to
+find, and as much for the error that it really makes."""
+FASTEST, LINES_END = 0.2, 0.45
+"""Highest frequency of an oscillation, and of a line, over the sample rate: faster is the noise's own colour."""
+DAMPING, LINE_DAMPING = (1e-3, 20.0), (1e-6, 1.0)
+NEAR = 1.1
+"""How far a line may be from where it was found, as a factor."""
+KEPT = 3
+"""Starts of a grid from which the search goes on."""
+STEPS, ENOUGH = 30, 0.01
+"""Steps of one search at most; it ends where one lowers the risk by less."""
+WIDEST = 1.5
+"""Change of the logarithm of a parameter in a step."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A family with its parameters, and the lines beside it that have a width.
+
+    signal : S [F];  risk : as estimated;  price : of the parameters
+    """
+
+    family: str
+    values: Mapping[str, float]
+    lines: tuple[Line, ...]
+    signal: np.ndarray
+    risk: float
+    price: float
+
+    @property
+    def cost(self) -> float:
+        return self.risk + self.price
+
+
+def still(spectrum: Spectrum, lines: tuple[Line, ...] = ()) -> Fit:
+    """A rate that does not move, but for the lines."""
+    signal = _of_lines(spectrum, lines)
+    return Fit("", {}, lines, signal, float(spectrum.risk(signal)), _price(spectrum, (), len(lines)))
+
+
+def search(spectrum: Spectrum, family: str, lines: tuple[Line, ...], crossing: float) -> Fit:
+    """Least risk of a family beside the lines, whose parameters are then searched with it.
+
+    crossing : frequency at which rate and noise are alike, about
+    """
+    beside = _of_lines(spectrum, lines)
+    grid = _GRIDS[family](spectrum, crossing)
+    signals = FAMILIES[family].density({name: grid[:, [k]] for k, name in enumerate(FAMILIES[family].names)},
+                                       spectrum.frequency, spectrum.rate_hz)  # fmt: skip
+    risks = spectrum.risk(signals + beside)
+    return min(
+        (refine(spectrum, family, grid[place], lines) for place in np.argsort(risks)[:KEPT].tolist()),
+        key=lambda fit: fit.cost,
+    )
+
+
+def refine(
+    spectrum: Spectrum, family: str, start: np.ndarray, lines: tuple[Line, ...], beside: np.ndarray | None = None
+) -> Fit:
+    """Least risk from a start, of the parameters of family and lines together; family "": of the lines alone.
+
+    beside : S [F], of the rest of the motion, which stays as it is
+    """
+    kind = FAMILIES.get(family)
+    names = kind.names if kind else ()
+    bounds = _bounds(spectrum)
+    ends = [bounds[name] for name in names] + [one for line in lines for one in _line_bounds(spectrum, line)]
+    low, high = np.log(ends).T
+    logs = np.clip(np.log([*start, *(getattr(line, name) for line in lines for name in LINE)]), low, high)
+
+    def signal(logs: np.ndarray) -> np.ndarray:
+        found = _signal(spectrum, kind, _lines(np.exp(logs[len(names) :])), np.exp(logs[: len(names)]))
+        return found if beside is None else found + beside
+
+    logs, found, risk = _descend(spectrum, signal, logs, low, high)
+    values = dict(zip(names, np.exp(logs[: len(names)]).tolist(), strict=True))
+    return Fit(family, values, _lines(np.exp(logs[len(names) :])), found, risk, _price(spectrum, names, len(lines)))
+
+
+def _descend(
+    spectrum: Spectrum, signal: Callable[[np.ndarray], np.ndarray], logs: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Logarithms of the parameters, S and risk, where it is least."""
+    here, damping = signal(logs), 1e-2
+    risk = float(spectrum.risk(here))
+    for _ in range(STEPS):
+        total = here + spectrum.noise
+        small = np.array([signal(logs + 1e-4 * one) - here for one in np.eye(len(logs))]) * 1e4
+        gain = small * spectrum.noise / total**2
+        slope = gain @ (2.0 * spectrum.weight * (1.0 - spectrum.power / total))
+        curve = (gain * (2.0 * spectrum.weight * total / spectrum.noise)) @ gain.T
+        while damping < 1e6:
+            sides = np.diag(curve) + 1e-9
+            step = np.linalg.solve(curve + damping * np.diag(sides), -slope)
+            there = np.clip(logs + np.clip(step, -WIDEST, WIDEST), low, high)
+            other = signal(there)
+            less = risk - float(spectrum.risk(other))
+            if less > 0.0:
+                break
+            damping *= 5.0
+        else:
+            break
+        logs, here, risk, damping = there, other, risk - less, max(damping / 5.0, 1e-6)
+        if less < ENOUGH:
+            break
+    return logs, here, risk
+
+
+def _signal(spectrum: Spectrum, kind: Family | None, lines: tuple[Line, ...], values: np.ndarray) -> np.ndarray:
+    whole = _of_lines(spectrum, lines)
+    if kind is None:
+        return whole
+    named = dict(zip(kind.names, values, strict=True))
+    found: np.ndarray = whole + kind.density(named, spectrum.frequency, spectrum.rate_hz)
+    return found
+
+
+def _of_lines(spectrum: Spectrum, lines: tuple[Line, ...]) -> np.ndarray:
+    return sum((of_line(one, spectrum.frequency, spectrum.rate_hz) for one in lines), np.zeros(len(spectrum.power)))
+
+
+def _lines(values: np.ndarray) -> tuple[Line, ...]:
+    return tuple(Line(*one) for one in values.reshape(-1, len(LINE)).tolist())
+
+
+def _price(spectrum: Spectrum, names: tuple[str, ...], lines: int) -> float:
+    return PRICE * len(names) + line_price(spectrum) * lines
+
+
+def line_price(spectrum: Spectrum) -> float:
+    """Of three parameters. The frequency costs 2·ln(frequencies) more, as it is the best of so many."""
+    return len(LINE) * PRICE + 2.0 * math.log(max(0.5 * float(spectrum.weight.sum()), 1.0))
+
+
+def signal_of(spectrum: Spectrum, fit: Fit, lines: tuple[Line, ...]) -> np.ndarray:
+    """S [F] of a fit with these lines at other frequencies than it was made on."""
+    return _signal(spectrum, FAMILIES.get(fit.family), lines, np.array(list(fit.values.values())))
+
+
+def _bounds(spectrum: Spectrum) -> dict[str, tuple[float, float]]:
+    lowest = spectrum.frequency[0]
+    hertz = (0.01 * lowest, FASTEST * spectrum.rate_hz)
+    size = math.sqrt(float(spectrum.noise.mean()) * spectrum.rate_hz)
+    return {
+        "q": (1e-60, 1e60), "tau_s": (1.0 / (2.0 * math.pi * hertz[1]), 1e3 / lowest), "sd": (1e-9 * size, 1e9 * size),
+        "frequency_hz": hertz, "second_hz": hertz, "damping": DAMPING, "second_damping": DAMPING,
+    }  # fmt: skip
+
+
+def _line_bounds(spectrum: Spectrum, line: Line) -> tuple[tuple[float, float], ...]:
+    """Of frequency, damping and s.d.: a line stays where it was found."""
+    middle = min(max(line.frequency_hz, spectrum.frequency[0]), LINES_END * spectrum.rate_hz)
+    return (middle / NEAR, middle * NEAR), LINE_DAMPING, _bounds(spectrum)["sd"]
+
+
+def crossing_of(spectrum: Spectrum, signal: np.ndarray) -> float:
+    """Highest frequency at which the signal is above the noise, Hz; the lowest there is where it never is."""
+    above = np.flatnonzero(signal >= spectrum.noise)
+    return float(spectrum.frequency[above[-1]]) if above.size else float(spectrum.frequency[0])
+
+
+def _product(*sides: np.ndarray | tuple[float, ...]) -> np.ndarray:
+    return np.stack([one.ravel() for one in np.meshgrid(*sides, indexing="ij")], axis=1)
+
+
+def _driven_grid(order: int) -> Callable[[Spectrum, float], np.ndarray]:
+    """The frequency at which rate and noise have the same density, q = N²·(2π·f)^(2·order)."""
+
+    def grid(spectrum: Spectrum, crossing: float) -> np.ndarray:  # noqa: ARG001
+        places = np.geomspace(0.03 * spectrum.frequency[0], spectrum.rate_hz, 30)
+        return (spectrum.noise[0] * (2.0 * math.pi * places) ** (2 * order))[:, None]
+
+    return grid
+
+
+def _markov_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+    """Time constants, each with the variance for which rate and noise are alike at the crossing."""
+    tau = np.geomspace(2.0 / spectrum.rate_hz, 100.0 / spectrum.frequency[0], 12)
+    q = spectrum.noise[0] * (2.0 * math.pi * crossing) ** 2
+    return np.stack([tau, np.sqrt(0.5 * q * tau)], axis=1)
+
+
+def _level(spectrum: Spectrum, crossing: np.ndarray, *sections: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Density at 0 Hz of a product of sections which at the crossing is that of the noise."""
+    level = np.full(len(crossing), spectrum.noise[0])
+    for own, damping in sections:
+        square = (crossing / own) ** 2
+        level *= (1.0 - square) ** 2 + 4.0 * damping**2 * square
+    return level
+
+
+def _resonance_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+    """Below the crossing, and at the highest line."""
+    peak = spectrum.frequency[int(np.argmax(spectrum.power * spectrum.weight))]
+    hertz = np.minimum(np.append(crossing * np.array([0.1, 0.3, 0.6, 1.0]), peak), FASTEST * spectrum.rate_hz)
+    own, damping, at = _product(hertz, (0.005, 0.02, 0.2, 0.6, 2.0), (crossing, 1.5 * crossing)).T
+    level = _level(spectrum, at, (own, damping))
+    return np.stack([own, damping, np.sqrt(level * 2.0 * math.pi * own / (4.0 * damping))], axis=1)
+
+
+def _oscillator_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+    """The resonances about random walks of a hundredth to a half of their frequency."""
+    place = np.repeat(_resonance_grid(spectrum, crossing), 3, axis=0)
+    share = np.tile([0.01, 0.1, 0.5], len(place) // 3)
+    q = spectrum.noise[0] * (2.0 * math.pi * share * place[:, 0]) ** 2
+    return np.column_stack([place, q])
+
+
+def _pair_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+    """Both below the crossing or at it, from sharp to wide."""
+    first = np.minimum(crossing * np.array([0.3, 0.6, 0.9]), 0.4 * FASTEST * spectrum.rate_hz)
+    own, ratio, damping, loss, at = _product(
+        first, (0.5, 1.0, 2.0), (0.1, 0.4, 1.0), (0.01, 0.05, 0.3, 1.0), (crossing, 1.2 * crossing)
+    ).T
+    second = ratio * own
+    power = _level(spectrum, at, (own, damping), (second, loss)) * pair_power(own, damping, second, loss)
+    return np.stack([own, damping, second, loss, np.sqrt(power)], axis=1)
+
+
+_GRIDS = {
+    "random_walk": _driven_grid(1),
+    "acceleration": _driven_grid(2),
+    "jerk": _driven_grid(3),
+    "markov": _markov_grid,
+    "resonance": _resonance_grid,
+    "oscillator": _oscillator_grid,
+    "pair": _pair_grid,
+}
+assert FAMILIES["pair"].names == PAIR

@@ -1,0 +1,1 @@
+"""vgyro's own methods: what the other folders find, put together."""

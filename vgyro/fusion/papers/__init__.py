@@ -1,0 +1,1 @@
+"""The methods of the literature, each in the form that its paper gives."""

@@ -1,0 +1,1 @@
+"""Figures of a test with a known true rate."""

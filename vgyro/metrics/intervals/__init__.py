@@ -1,0 +1,1 @@
+"""Intervals by resampling: moving blocks, and draws of a fitted noise model."""

@@ -1,0 +1,1 @@
+"""Amplitude densities and the lines in them."""

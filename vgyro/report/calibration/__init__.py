@@ -1,0 +1,1 @@
+"""Sections on the calibration: a certificate for each axis."""

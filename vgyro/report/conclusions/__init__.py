@@ -1,0 +1,1 @@
+"""What a page concludes, and what it rests on: rules, the cross-check, conventions."""

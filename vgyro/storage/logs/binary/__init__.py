@@ -1,0 +1,1 @@
+"""Readers of binary logs, one family a module."""

@@ -1,0 +1,1 @@
+"""Stages of figures: measured, and cross-checked."""

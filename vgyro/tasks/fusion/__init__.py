@@ -1,0 +1,1 @@
+"""Stages of fusion: noise, faults, virtual gyroscopes."""

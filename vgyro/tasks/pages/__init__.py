@@ -1,0 +1,1 @@
+"""Stages of pages: one of a data set, and the overview."""

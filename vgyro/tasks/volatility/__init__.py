@@ -1,0 +1,1 @@
+"""Stages of volatility: series, windows, effects, BEKK."""

@@ -1,0 +1,1 @@
+"""What an ARCH effect of a gyro's level is."""
