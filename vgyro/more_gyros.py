@@ -121,14 +121,14 @@ def dependence(correlation: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]) ->
 
 
 @dataclass(frozen=True)
-class Analysis:
+class LargerArrays:
     """columns : of more_gyros.parquet.  summary : what the report says in words, as JSON; null where not known"""
 
     columns: dict[str, np.ndarray]
     summary: dict[str, object]
 
 
-def analyse(noise: ArrayNoise, correlation: MeanCorrelation, parameters: FilterParameters, most: int) -> Analysis:
+def analyse(noise: ArrayNoise, correlation: MeanCorrelation, parameters: FilterParameters, most: int) -> LargerArrays:
     """Virtual gyros of 1 … `most` alike gyros, for the correlation of this array, its limits, and ASSUMED ones.
 
     noise : of the present array. Its own R stands for the present value, D = 1'R⁻¹1; the analysis is of equal gyros
@@ -152,7 +152,7 @@ def analyse(noise: ArrayNoise, correlation: MeanCorrelation, parameters: FilterP
         name: np.array([row[place] for row in rows], dtype=kind)
         for place, (name, kind) in enumerate(zip(names, types, strict=True))
     }
-    return Analysis(columns, _summary(len(noise.arw), correlation, arw / present))
+    return LargerArrays(columns, _summary(len(noise.arw), correlation, arw / present))
 
 
 def _present_arw(noise: ArrayNoise) -> float:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vgyro.alignment import Stream
+from vgyro.alignment import AlignedStream
 
 NOISE = 0.08
 
@@ -40,7 +40,7 @@ def random_motion(
 
 
 class Recorded(NamedTuple):
-    stream: Stream
+    stream: AlignedStream
     true_time: np.ndarray
     bias: float
 
@@ -64,7 +64,7 @@ def record(
     rate = bias + rng.normal(0, noise, samples)
     if motion is not None:
         rate = rate + (1 + rng.uniform(-scale_error, scale_error)) * motion.at(true_time)
-    return Recorded(Stream(origin + own, rate, rate_hz), true_time, bias)
+    return Recorded(AlignedStream(origin + own, rate, rate_hz), true_time, bias)
 
 
 def board(

@@ -14,8 +14,8 @@ from vgyro.alignment import (
     FOUND,
     NO_COMMON_MOTION,
     TOO_SHORT,
+    AlignedStream,
     ClockFit,
-    Stream,
     noise_gain,
     positions,
     refuse_clock,
@@ -30,9 +30,9 @@ OWN_CLOCKS = ((12000, 0.0, 0.0, 0.2), (12002, 180.0, 0.34, -0.4), (11997, -240.0
 BOTH_ENDS = ((10.0, 3.0), (110.0, 3.0))
 
 
-def own_clock(number: int) -> Stream:
+def own_clock(number: int) -> AlignedStream:
     rate = np.load(DATA / "own_clocks.npz")[f"gyro_{number}"] / 1e4
-    return Stream(np.arange(len(rate)) / 100, rate, 100.0)
+    return AlignedStream(np.arange(len(rate)) / 100, rate, 100.0)
 
 
 def pair(
@@ -225,7 +225,7 @@ def test_gaps_and_nan_are_left_out() -> None:
     motion = random_motion(rng, 10)
     first, second = record(rng, motion), record(rng, motion, start=0.3, ppm=-150)
     kept = np.r_[0:3000, 3500:12000]
-    broken = Stream(second.stream.time[kept], second.stream.rate[kept].copy(), 100.0)
+    broken = AlignedStream(second.stream.time[kept], second.stream.rate[kept].copy(), 100.0)
     broken.rate[rng.integers(0, len(kept), 100)] = np.nan
     fit = relative_clock(first.stream, broken)
     assert fit.offset_s == pytest.approx(0.3, abs=1e-3)
@@ -253,9 +253,9 @@ def test_most_offset_bounds_the_search() -> None:
 
 
 def test_short_and_empty_streams() -> None:
-    nothing = Stream(np.zeros(0), np.zeros(0), 100.0)
-    short = Stream(np.arange(50) / 100, np.zeros(50), 100.0)
-    dead = Stream(np.arange(5000) / 100, np.zeros(5000), 100.0)
+    nothing = AlignedStream(np.zeros(0), np.zeros(0), 100.0)
+    short = AlignedStream(np.arange(50) / 100, np.zeros(50), 100.0)
+    dead = AlignedStream(np.arange(5000) / 100, np.zeros(5000), 100.0)
     assert relative_clock(nothing, dead).status == TOO_SHORT
     assert relative_clock(dead, short).status == TOO_SHORT
     assert relative_clock(dead, dead).status == NO_COMMON_MOTION
@@ -263,7 +263,7 @@ def test_short_and_empty_streams() -> None:
 
 @pytest.mark.parametrize("status", [NO_COMMON_MOTION, AMBIGUOUS, TOO_SHORT])
 def test_the_refusal_says_what_to_record(status: str) -> None:
-    dead = Stream(np.arange(5000) / 100, np.zeros(5000), 100.0)
+    dead = AlignedStream(np.arange(5000) / 100, np.zeros(5000), 100.0)
     text = str(refuse_clock(relative_clock(dead, dead)._replace(status=status), "left.csv, right.csv"))
     assert text.startswith("left.csv, right.csv: ")
     assert "at the beginning and the end of the recording" in text

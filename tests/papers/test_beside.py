@@ -5,7 +5,7 @@ import math
 import pytest
 
 from vgyro.dataset import Manifest
-from vgyro.papers import PAPERS, Evidence, load_paper
+from vgyro.papers import PAPERS, PaperEvidence, load_paper
 from vgyro.papers.beside import set_beside
 from vgyro.papers.published import PublishedTable
 from vgyro.tasks.papers.evidence import at_added_rate
@@ -66,7 +66,7 @@ def of(found, figure, method="new", case="at rest"):
 
 
 def test_the_ratio_is_to_the_least_of_the_papers_methods():
-    found = set_beside(table(), Evidence({"metrics": metrics(), "ratios": ratios()}))
+    found = set_beside(table(), PaperEvidence({"metrics": metrics(), "ratios": ratios()}))
     sigma = of(found, "1σ")
     # Relative half-widths of 0.03/1 and 0.08/2 in quadrature: 0.05 of 0.5.
     assert (sigma.over, sigma.standing, sigma.own) == ("Average", "better", True)
@@ -80,27 +80,27 @@ def test_the_ratio_is_to_the_least_of_the_papers_methods():
 
 @pytest.mark.parametrize(("sigma", "half", "standing"), [(1.98, 0.1, "undecided"), (2.5, 0.1, "worse")])
 def test_an_interval_that_holds_1_decides_nothing(sigma, half, standing):
-    found = set_beside(table(), Evidence({"metrics": metrics(sigma, half), "ratios": ratios()}))
+    found = set_beside(table(), PaperEvidence({"metrics": metrics(sigma, half), "ratios": ratios()}))
     assert of(found, "1σ").standing == standing
 
 
 @pytest.mark.parametrize(("amplitude", "standing"), [(62.8, "met"), (62.3, "undecided"), (60.0, "missed")])
 def test_a_target_is_met_where_the_whole_interval_is_near(amplitude, standing):
-    one = of(set_beside(table(), Evidence({"metrics": metrics(amplitude=amplitude)})), "Amplitude")
+    one = of(set_beside(table(), PaperEvidence({"metrics": metrics(amplitude=amplitude)})), "Amplitude")
     assert (one.standing, one.over) == (standing, "")
     assert math.isnan(one.ratio.value)
 
 
 def test_a_case_without_artefacts_is_left_out_and_the_rate_is_named():
-    assert {one.case for one in set_beside(table(), Evidence({"metrics": metrics()}))} == {"at rest"}
+    assert {one.case for one in set_beside(table(), PaperEvidence({"metrics": metrics()}))} == {"at rest"}
     moved = [{**one, "true_rate": 0.05} for one in metrics(sigma=3.0)]
-    found = set_beside(table(), Evidence({"metrics": metrics(), "metrics_moved": moved}))
+    found = set_beside(table(), PaperEvidence({"metrics": metrics(), "metrics_moved": moved}))
     assert {one.case for one in found} == {"at rest", "at 0.05 deg/s"}
     assert of(found, "1σ", case="at 0.05 deg/s").standing == "worse"
 
 
 def test_a_missing_figure_says_why():
-    found = set_beside(table(), Evidence({"metrics": []}))
+    found = set_beside(table(), PaperEvidence({"metrics": []}))
     assert all(one.value.reason and one.standing == "none" for one in found)
     assert of(found, "1σ").ratio.reason == "the paper's methods have no such figure"
 
@@ -128,7 +128,7 @@ def test_figures_at_an_added_rate_are_the_moved_ones_and_those_that_do_not_move(
 
 
 def test_the_part_of_the_page_counts_and_marks():
-    evidence = Evidence({"metrics": metrics(), "ratios": ratios()})
+    evidence = PaperEvidence({"metrics": metrics(), "ratios": ratios()})
     found = set_beside(table(), evidence)
     ((name, said),) = own_counts({3: found})
     assert name == "new"
@@ -145,7 +145,7 @@ def test_the_part_of_the_page_counts_and_marks():
 def test_what_a_filter_does_by_its_shape_is_told():
     rows = metrics()
     rows[2]["note"] = "low-passed to 1 Hz; forward and back: by its shape alone it passes 0.88"
-    text = str(own_methods(table(), set_beside(table(), Evidence({"metrics": rows}))))
+    text = str(own_methods(table(), set_beside(table(), PaperEvidence({"metrics": rows}))))
     assert "<li>forward and back: by its shape alone it passes 0.88</li>" in text
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vgyro.papers import PAPERS, Claim, Evidence, Ours, judge, load_paper
+from vgyro.papers import PAPERS, Claim, Ours, PaperEvidence, judge, load_paper
 from vgyro.papers.claims import ratio
 from vgyro.papers.implied_cells import implied_figures
 
@@ -13,7 +13,7 @@ A, B = {"artefact": "metrics", "method": "a"}, {"artefact": "metrics", "method":
 
 def evidence(**figures):
     rows = [{"method": name, "value": v, "low": low, "high": high} for name, (v, low, high) in figures.items()]
-    return Evidence({"metrics": rows}, ("a", "b"))
+    return PaperEvidence({"metrics": rows}, ("a", "b"))
 
 
 def outcome(rule, found, implied=None):
@@ -114,7 +114,7 @@ def test_the_comment_of_the_verdict_is_added_and_no_other():
 def test_every_claim_can_be_judged_without_any_figure(name):
     paper = load_paper(name)
     for claim in paper.claims:
-        verdict = judge(claim, Evidence({}, ()), implied_figures(paper))
+        verdict = judge(claim, PaperEvidence({}, ()), implied_figures(paper))
         decided_by_equations = claim.rule.kind == "implied"
         assert (verdict.outcome != "cannot be decided") == decided_by_equations
         assert verdict.reason
@@ -123,6 +123,6 @@ def test_every_claim_can_be_judged_without_any_figure(name):
 def test_the_printed_factor_of_bias_drift_does_not_hold():
     # 272.41 / 6 / 11.02 = 4.12, printed 4.09.
     paper = load_paper("liu2015")
-    claims = {claim.name: judge(claim, Evidence({}), implied_figures(paper)).outcome for claim in paper.claims}
+    claims = {claim.name: judge(claim, PaperEvidence({}), implied_figures(paper)).outcome for claim in paper.claims}
     assert claims["improvement factor of bias drift"] == "does not hold"
     assert claims["improvement factor of the mean"] == "holds"

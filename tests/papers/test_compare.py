@@ -7,7 +7,7 @@ import math
 import pytest
 
 from vgyro.errors import DataError
-from vgyro.papers import PAPERS, Evidence, Ours, compare, csv_of, load_paper, look_up, with_single
+from vgyro.papers import PAPERS, Ours, PaperEvidence, compare, csv_of, load_paper, look_up, with_single
 from vgyro.papers.compare import CSV_COLUMNS, agreement
 from vgyro.papers.implied_cells import implied_cells
 
@@ -35,13 +35,13 @@ def everything(paper):
                     known.update({reads["value"]: 1.0, reads["low"]: 0.9, reads["high"]: 1.1})
                     if unit is None and name.startswith(("metrics", "factors")):
                         known["unit"] = table.unit_of(row, column)
-    return Evidence({name: list(found.values()) for name, found in rows.items()}, GYROS)
+    return PaperEvidence({name: list(found.values()) for name, found in rows.items()}, GYROS)
 
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_every_numeric_cell_has_a_counterpart_or_a_reason(name):
     paper = load_paper(name)
-    for evidence, filled in ((everything(paper), True), (Evidence({}, GYROS), False)):
+    for evidence, filled in ((everything(paper), True), (PaperEvidence({}, GYROS), False)):
         for table in paper.tables:
             comparison = compare(paper, table, evidence, implied_cells(paper))
             for row in table.rows:
@@ -82,7 +82,9 @@ def test_a_reading_of_another_quantity_is_shown_and_not_compared():
 def test_csv_of_an_absent_figure_is_empty_with_a_reason():
     paper = load_paper("liu2015")
     lines = list(
-        csv.DictReader(io.StringIO(csv_of([compare(paper, paper.table(3), Evidence({}, GYROS), implied_cells(paper))])))
+        csv.DictReader(
+            io.StringIO(csv_of([compare(paper, paper.table(3), PaperEvidence({}, GYROS), implied_cells(paper))]))
+        )
     )
     assert all(line["ours"] == "" and line["reason"] and line["agreement"] == "none" for line in lines)
 
@@ -109,7 +111,7 @@ def test_look_up_by_columns():
         {"method": "g4", "metric": "mean", "value": -0.1, "low": -0.2, "high": -0.05, "unit": "deg/s", "note": "n"},
         {"method": "g4", "metric": "sigma", "value": math.nan, "low": math.nan, "high": math.nan, "note": "too short"},
     ]
-    evidence = Evidence({"metrics": rows}, GYROS)
+    evidence = PaperEvidence({"metrics": rows}, GYROS)
     select = {"artefact": "metrics", "method": "$gyro4", "metric": "mean"}
     assert look_up(evidence, select).value == -0.1
     found = look_up(evidence, {**select, "absolute": True})
@@ -122,12 +124,12 @@ def test_look_up_by_columns():
 
 def test_the_magnitude_of_a_figure_whose_limits_hold_0():
     rows = [{"value": 0.1, "low": -0.3, "high": 0.2}]
-    found = look_up(Evidence({"m": rows}), {"artefact": "m", "absolute": True})
+    found = look_up(PaperEvidence({"m": rows}), {"artefact": "m", "absolute": True})
     assert (found.low, found.high) == (0.0, 0.3)
 
 
 def test_two_fitting_rows_are_an_error():
-    evidence = Evidence({"m": [{"value": 1.0}, {"value": 2.0}]})
+    evidence = PaperEvidence({"m": [{"value": 1.0}, {"value": 2.0}]})
     with pytest.raises(DataError, match="2 rows fit"):
         look_up(evidence, {"artefact": "m"})
 
@@ -140,7 +142,7 @@ def test_single_is_the_mean_over_the_gyros():
         }  # fmt: skip
 
     rows = [row("g1", "mean", -0.2, 0.03), row("g2", "mean", 0.1, 0.04), row("g1", "sigma", 1.0, 0.1)]
-    evidence = Evidence({"metrics": with_single(rows, ("g1", "g2"))}, ("g1", "g2"))
+    evidence = PaperEvidence({"metrics": with_single(rows, ("g1", "g2"))}, ("g1", "g2"))
     single = look_up(evidence, {"artefact": "metrics", "method": "single", "metric": "mean"})
     # Magnitudes are averaged; the half-widths 0.03 and 0.04 give 0.05 / 2.
     assert (single.value, single.low, single.high) == pytest.approx((0.15, 0.125, 0.175))
@@ -159,7 +161,7 @@ def test_a_figure_in_another_unit_is_not_compared():
             "unit": "deg/s",
         }
     ]
-    comparison = compare(paper, paper.table(2), Evidence({"metrics": rows}, GYROS), implied_cells(paper))
+    comparison = compare(paper, paper.table(2), PaperEvidence({"metrics": rows}, GYROS), implied_cells(paper))
     (cell, _) = comparison.at("ARW", "Simple average")
     assert not cell.ours.known
     assert cell.reason == "ours is in deg/s, the table in deg/√h"

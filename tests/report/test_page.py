@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from vgyro.report.page import Section, render_page
 from vgyro.report.plots import Axis, Curve, curve_plot
-from vgyro.report.tables import Cell, Column, Notes, Row, number_cell, render_table
+from vgyro.report.tables import Cell, Notes, TableColumn, TableRow, number_cell, render_table
 
 
 def plot(name: str = "p") -> Markup:
@@ -66,7 +66,9 @@ def test_a_simulated_page_says_so() -> None:
 
 
 def test_a_table_escapes_text_and_gives_units() -> None:
-    html = render_table([Column("gyro", numeric=False), Column("σ", "deg/s")], [["<g>", number_cell(1.5, 1.4, 1.6)]])
+    html = render_table(
+        [TableColumn("gyro", numeric=False), TableColumn("σ", "deg/s")], [["<g>", number_cell(1.5, 1.4, 1.6)]]
+    )
     assert "&lt;g&gt;" in html
     assert '<span class="unit">deg/s</span>' in html
     assert re.search(r'class="number">1\.500?<span class="below">1\.400? … 1\.600?</span>', html)
@@ -74,13 +76,17 @@ def test_a_table_escapes_text_and_gives_units() -> None:
 
 def test_a_row_of_the_wrong_width_is_refused() -> None:
     with pytest.raises(ValueError, match="1 cells, the table has 2 columns"):
-        render_table([Column("a"), Column("b")], [["only one"]])
+        render_table([TableColumn("a"), TableColumn("b")], [["only one"]])
 
 
 def test_headings_span_the_table_and_notes_are_numbered_once() -> None:
     notes = Notes()
-    rows = [Row(heading="Methods"), [Cell("a", notes=notes.number("same"))], [Cell("b", notes=notes.number("same"))]]
-    html = render_table([Column("name")], rows, notes=notes.texts)
+    rows = [
+        TableRow(heading="Methods"),
+        [Cell("a", notes=notes.number("same"))],
+        [Cell("b", notes=notes.number("same"))],
+    ]
+    html = render_table([TableColumn("name")], rows, notes=notes.texts)
     assert notes.texts == ["same"]
     assert html.count("<sup>1</sup>") == 2
     assert html.count("<li>same</li>") == 1

@@ -13,7 +13,7 @@ from vgyro.report.index_page import render_index
 from vgyro.storage.tables import read_json
 from vgyro.tasks.common import Task
 from vgyro.tasks.pages import index, report
-from vgyro.tasks.pages.report import Place, place_of
+from vgyro.tasks.pages.report import ArtefactPlace, place_of
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +35,9 @@ def builder() -> ModuleType:
 
 def test_places_of_artefacts() -> None:
     root = Path("results/demo")
-    assert place_of(root / "static/rates.parquet", "demo") == Place("static", "", "", "rates")
-    assert place_of(root / "static/x/allan.parquet", "demo") == Place("static", "x", "", "allan")
-    assert place_of(root / "demo/x/level/dcc.parquet", "demo") == Place("demo", "x", "level", "dcc")
+    assert place_of(root / "static/rates.parquet", "demo") == ArtefactPlace("static", "", "", "rates")
+    assert place_of(root / "static/x/allan.parquet", "demo") == ArtefactPlace("static", "x", "", "allan")
+    assert place_of(root / "demo/x/level/dcc.parquet", "demo") == ArtefactPlace("demo", "x", "level", "dcc")
     with pytest.raises(ValueError, match="not in results/other"):
         place_of(root / "static/rates.parquet", "other")
 

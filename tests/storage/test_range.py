@@ -9,7 +9,7 @@ from vgyro.board import Board
 from vgyro.config import IntegrityOptions
 from vgyro.storage.frames import channel_watches, gyro_rails
 from vgyro.storage.integrity import Ledger, Refused
-from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
+from vgyro.storage.verdict import RecordingOutcome, conclude, refuse_if_needed
 
 VALUES = 1000
 SAMPLES = VALUES + 1  # the last one has no value
@@ -36,7 +36,7 @@ def record_of(board: Board, columns: list[np.ndarray], options: IntegrityOptions
     time = np.arange(SAMPLES) / 100.0
     for gyro, column in zip(board.gyros, columns, strict=True):
         watches[gyro.field].feed(column, time)
-    outcome = Outcome(board, "rates" if rates else "counts", [], SAMPLES, 0, time[-1], 100.0, 100.0, 1)
+    outcome = RecordingOutcome(board, "rates" if rates else "counts", [], SAMPLES, 0, time[-1], 100.0, 100.0, 1)
     channels = {name: watch.record() for name, watch in watches.items()}
     record = conclude(outcome, Ledger(), channels, options, [])
     refuse_if_needed(record, options, "file.bin", lambda: "frames")
@@ -105,7 +105,7 @@ def test_the_limit_is_an_option():
 
 def test_frames_that_are_not_good_come_first():
     board = board_of(2)
-    outcome = Outcome(board, "counts", [], 10, 0, 0.1, 100.0, 100.0, 1)
+    outcome = RecordingOutcome(board, "counts", [], 10, 0, 0.1, 100.0, 100.0, 1)
     watches = channel_watches(board)
     for gyro in board.gyros:
         watches[gyro.field].feed(np.full(10, 1e6), np.arange(10) / 100.0)

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from vgyro.metrics.spectra.tones import find_tones
 from vgyro.metrics.spectra.welch import spectral_density
 from vgyro.volatility import block_means, fit_garch
-from vgyro.volatility.effects.kinds import Garch, RateTone, Sampled, alias, gather_evidence
+from vgyro.volatility.effects.kinds import GarchEffect, RateTone, Sampled, alias, gather_evidence
 from vgyro.volatility.effects.verdicts import Effect, explain_array
 from vgyro.volatility.effects.whiten import block_gain
 
@@ -49,7 +49,7 @@ def seen_tone(frequency: float, amplitude: float) -> np.ndarray:
 
 
 def explain(
-    values: np.ndarray, tones: list[RateTone] | None = None, model: Garch | None = None, block: int = 200
+    values: np.ndarray, tones: list[RateTone] | None = None, model: GarchEffect | None = None, block: int = 200
 ) -> Effect:
     """The effect of a series [T], or of the first of several [T, N]."""
     values = values[:, None] if values.ndim == 1 else values
@@ -229,8 +229,8 @@ def test_whether_garch_explains_it(true: bool, said: str):
     # Its own model explains a GARCH series; a model of constant variance does not.
     values = garch(np.random.default_rng(4), 0.1, 0.85)
     fit = fit_garch(values[:, None])
-    model = Garch(*(float(each[0]) for each in (fit.omega, fit.alpha, fit.beta)))
-    effect = explain(values, model=model if true else Garch(SIGMA**2, 0.0, 0.0))
+    model = GarchEffect(*(float(each[0]) for each in (fit.omega, fit.alpha, fit.beta)))
+    effect = explain(values, model=model if true else GarchEffect(SIGMA**2, 0.0, 0.0))
     assert f"{said} (standardised: " in effect.sentence
     assert (effect.p_standardised > 0.01) is true
     assert np.isnan(explain(values).p_standardised)

@@ -6,14 +6,14 @@ from vgyro.alignment.clock import (
     NO_COMMON_MOTION,
     STATUSES,
     TOO_SHORT,
+    ClockEvidence,
     ClockFit,
-    Evidence,
     refuse_clock,
     relative_clock,
 )
 from vgyro.alignment.delays import Delays, relative_delays
 from vgyro.alignment.interpolation import interpolate, noise_gain
-from vgyro.alignment.streams import Stream, positions, resample, stretches
+from vgyro.alignment.streams import AlignedStream, positions, resample, stretches
 
 __all__ = [
     "AMBIGUOUS",
@@ -21,10 +21,10 @@ __all__ = [
     "NO_COMMON_MOTION",
     "STATUSES",
     "TOO_SHORT",
+    "AlignedStream",
+    "ClockEvidence",
     "ClockFit",
     "Delays",
-    "Evidence",
-    "Stream",
     "interpolate",
     "noise_gain",
     "positions",

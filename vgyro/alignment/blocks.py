@@ -31,7 +31,7 @@ def block_numbers(time: np.ndarray, segment: np.ndarray, length_s: float = BLOCK
     return number
 
 
-class Blocks:
+class SampleBlocks:
     """Samples in blocks. Every array is [K] or [C, K], with samples last; values per block are [B] or [C, B].
 
     rows   : int [K], places of the samples in their evenly spaced series, rising
@@ -92,7 +92,7 @@ class Blocks:
         return (total[..., width:] - total[..., :-width]) / width
 
 
-def score_covariance(blocks: Blocks, slopes: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def score_covariance(blocks: SampleBlocks, slopes: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """Covariance of the sums Σ slopes · residual, [P, P].
 
     slopes : array [P, K], known; residual : array [K], stationary with any colour within a block
@@ -118,19 +118,19 @@ def score_covariance(blocks: Blocks, slopes: np.ndarray, residual: np.ndarray) -
     return even * np.outer(factor, factor)
 
 
-def independent_values(blocks: Blocks, one: np.ndarray, two: np.ndarray) -> float:
+def independent_values(blocks: SampleBlocks, one: np.ndarray, two: np.ndarray) -> float:
     """How many independent pairs of values two series are worth: [K], [K] → 1 / variance of their correlation.
 
     If they have nothing in common. Bartlett (1946), J. R. Stat. Soc. Suppl. 8(1), within each block, and within each
     quarter of a block: long blocks take a burst for a longer series, short ones a steady tone for several. The fewer.
     """
     quarter = blocks.block * 4 + blocks.place * 4 // blocks.length
-    parts = Blocks(blocks.rows, quarter, blocks.step_s)
+    parts = SampleBlocks(blocks.rows, quarter, blocks.step_s)
     power = (one @ one) * (two @ two)
     return float(power / max(_product_variance(blocks, one, two), _product_variance(parts, one, two), 1e-300))
 
 
-def _product_variance(blocks: Blocks, one: np.ndarray, two: np.ndarray) -> float:
+def _product_variance(blocks: SampleBlocks, one: np.ndarray, two: np.ndarray) -> float:
     products = []
     for values in (one, two):
         power = np.abs(blocks.spectra(values)) ** 2

@@ -21,8 +21,8 @@ from vgyro.alignment.growth import (
     score,
     unexplained,
 )
-from vgyro.alignment.pair import Line, PairFit
-from vgyro.alignment.streams import Band, Stream, highest_cutoff, low_pass
+from vgyro.alignment.pair import ClockRelation, PairFit
+from vgyro.alignment.streams import AlignedStream, Band, highest_cutoff, low_pass
 from vgyro.errors import DataError
 from vgyro.units import parts_per_million
 
@@ -38,7 +38,7 @@ CONFIDENCE = 0.95
 EVERYWHERE = (-math.inf, math.inf)
 
 
-class Evidence(NamedTuple):
+class ClockEvidence(NamedTuple):
     """What a ClockFit rests on.
 
     correlation : of both streams on one time, slow drift removed
@@ -88,7 +88,7 @@ class ClockFit(NamedTuple):
     drift_high: float
     significant: bool
     status: str
-    evidence: Evidence
+    evidence: ClockEvidence
     origins: tuple[float, float]
     best: tuple[float, float, float]
 
@@ -107,8 +107,8 @@ class ClockFit(NamedTuple):
 
 
 def relative_clock(
-    reference: Stream,
-    other: Stream,
+    reference: AlignedStream,
+    other: AlignedStream,
     most_offset_s: float = math.inf,
     most_drift_ppm: float = MOST_DRIFT_PPM,
     false_alarm: float = FALSE_ALARM,
@@ -126,8 +126,8 @@ def relative_clock(
     A recording of any length: at most 300 blocks of ten seconds are compared, those that move most in each thirtieth.
     """
     starts = (float(reference.time[0]), float(other.time[0])) if len(reference.time) and len(other.time) else (0.0, 0.0)
-    one = Stream(np.asarray(reference.time, dtype=float) - starts[0], reference.rate, reference.rate_hz)
-    two = Stream(np.asarray(other.time, dtype=float) - starts[1], other.rate, other.rate_hz)
+    one = AlignedStream(np.asarray(reference.time, dtype=float) - starts[0], reference.rate, reference.rate_hz)
+    two = AlignedStream(np.asarray(other.time, dtype=float) - starts[1], other.rate, other.rate_hz)
     highest = highest_cutoff(min(one.rate_hz, two.rate_hz))
     bands = _bands(one, two, min(SEARCH_HZ, highest))
     if bands is None:
@@ -143,7 +143,7 @@ def relative_clock(
     ]
     if not good:
         best = max(fits, key=score, default=None)
-        evidence = Evidence() if best is None else _evidence(best, min(chances), SEARCH_HZ, None)
+        evidence = ClockEvidence() if best is None else _evidence(best, min(chances), SEARCH_HZ, None)
         return _nothing(NO_COMMON_MOTION, starts, evidence)
     first = max(good, key=score)
     rival = _rival(first, good)
@@ -171,7 +171,7 @@ def refuse_clock(fit: ClockFit, where: str) -> DataError:
     return DataError(what, where, remedy)
 
 
-def _bands(one: Stream, two: Stream, cutoff_hz: float) -> tuple[Band, Band] | None:
+def _bands(one: AlignedStream, two: AlignedStream, cutoff_hz: float) -> tuple[Band, Band] | None:
     bands = low_pass(one, cutoff_hz), low_pass(two, cutoff_hz)
     return bands if min(len(band.time) for band in bands) > 1 else None
 
@@ -190,17 +190,17 @@ def _chance_log10(fit: PairFit, tried: int) -> float:
     return min(single + math.log10(tried), 0.0)
 
 
-def _evidence(fit: PairFit, chance: float, cutoff: float, rival: tuple[float, float] | None) -> Evidence:
+def _evidence(fit: PairFit, chance: float, cutoff: float, rival: tuple[float, float] | None) -> ClockEvidence:
     second = rival or (math.nan, math.inf)
-    return Evidence(fit.correlation, fit.scale, chance, fit.seconds, cutoff, *second)
+    return ClockEvidence(fit.correlation, fit.scale, chance, fit.seconds, cutoff, *second)
 
 
-def _clock(fit: PairFit, evidence: Evidence, starts: tuple[float, float], most_ppm: float) -> ClockFit:
+def _clock(fit: PairFit, evidence: ClockEvidence, starts: tuple[float, float], most_ppm: float) -> ClockFit:
     z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
     line, drift_error = fit.line, math.sqrt(fit.covariance[1, 1])
     known = z * drift_error < 1e-6 * most_ppm
     if not known:
-        line = Line(line.centre_s, line.lag_s, 0.0)
+        line = ClockRelation(line.centre_s, line.lag_s, 0.0)
     lag_error = math.sqrt(fit.covariance[0, 0])
     start = float(offset(line))
     reach = line.centre_s - start
@@ -229,6 +229,6 @@ def _clock(fit: PairFit, evidence: Evidence, starts: tuple[float, float], most_p
     )
 
 
-def _nothing(status: str, starts: tuple[float, float], evidence: Evidence | None = None) -> ClockFit:
+def _nothing(status: str, starts: tuple[float, float], evidence: ClockEvidence | None = None) -> ClockFit:
     nan = math.nan
-    return ClockFit(nan, nan, nan, nan, nan, nan, False, status, evidence or Evidence(), starts, (nan, nan, nan))
+    return ClockFit(nan, nan, nan, nan, nan, nan, False, status, evidence or ClockEvidence(), starts, (nan, nan, nan))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import fft, ndimage
 
 from vgyro.alignment.blocks import BLOCK_S
-from vgyro.alignment.pair import Line
+from vgyro.alignment.pair import ClockRelation
 from vgyro.alignment.streams import Band
 
 PIECE_S = 600.0
@@ -20,23 +20,23 @@ PEAKS = 10
 NEAR_S = 0.1  # peaks of different drifts that are one
 
 
-class Candidate(NamedTuple):
+class LineCandidate(NamedTuple):
     """A line to start from, and the part of the reference, s, in which it was found."""
 
-    line: Line
+    line: ClockRelation
     start_s: float
     stop_s: float
     score: float
 
 
-class Search(NamedTuple):
+class LineSearch(NamedTuple):
     """What was found, and among how many lags and drifts."""
 
-    candidates: list[Candidate]
+    candidates: list[LineCandidate]
     tried: int
 
 
-def search(reference: Band, other: Band, most_offset_s: float, most_drift: float) -> Search:
+def search(reference: Band, other: Band, most_offset_s: float, most_drift: float) -> LineSearch:
     """Candidates for the line between two bands, the best first.
 
     most_offset_s : most by which one stream begins after the other; most_drift : of the clocks, a ratio
@@ -45,11 +45,11 @@ def search(reference: Band, other: Band, most_offset_s: float, most_drift: float
     """
     step = reference.step_s
     x, x_good = _grid(reference, 0.0, step)
-    found: list[Candidate] = []
+    found: list[LineCandidate] = []
     tried = 0
     for start, stop in _pieces(x, round(PIECE_S / step)):
         drifts = _drifts((stop - start) * step, most_drift)
-        peaks: list[Candidate] = []
+        peaks: list[LineCandidate] = []
         for drift in drifts:
             y, y_good = _grid(other, drift, step)
             lags, scores = _scores(x[start:stop], x_good[start:stop], y, y_good, step)
@@ -58,10 +58,10 @@ def search(reference: Band, other: Band, most_offset_s: float, most_drift: float
             tried += int(np.count_nonzero(scores))
             centre = (start + stop) / 2 * step
             for peak in _peaks(scores):
-                line = Line(centre, (centre + shift[peak]) * (1 + drift) - centre, drift)
-                peaks.append(Candidate(line, start * step, stop * step, float(scores[peak])))
+                line = ClockRelation(centre, (centre + shift[peak]) * (1 + drift) - centre, drift)
+                peaks.append(LineCandidate(line, start * step, stop * step, float(scores[peak])))
         found += _merged(peaks)
-    return Search(sorted(found, key=lambda c: -c.score), max(tried, 1))
+    return LineSearch(sorted(found, key=lambda c: -c.score), max(tried, 1))
 
 
 def _drifts(seconds: float, most: float) -> np.ndarray:
@@ -118,8 +118,8 @@ def _peaks(scores: np.ndarray) -> np.ndarray:
     return tops[np.argsort(-scores[tops])[:PEAKS]]
 
 
-def _merged(peaks: list[Candidate]) -> list[Candidate]:
-    kept: list[Candidate] = []
+def _merged(peaks: list[LineCandidate]) -> list[LineCandidate]:
+    kept: list[LineCandidate] = []
     for peak in sorted(peaks, key=lambda c: -c.score):
         if all(abs(peak.line.lag_s - other.line.lag_s) > NEAR_S for other in kept):
             kept.append(peak)

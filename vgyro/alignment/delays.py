@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from vgyro.alignment.blocks import Blocks, block_numbers, score_covariance
+from vgyro.alignment.blocks import SampleBlocks, block_numbers, score_covariance
 from vgyro.alignment.clock import CUTOFFS_HZ
 from vgyro.alignment.moving import moving_rows
-from vgyro.alignment.pair import Line, agreement, rate_and_slope
-from vgyro.alignment.streams import Band, Stream, highest_cutoff, low_pass
+from vgyro.alignment.pair import ClockRelation, agreement, rate_and_slope
+from vgyro.alignment.streams import AlignedStream, Band, highest_cutoff, low_pass
 
 FOUND, NO_MOTION, TOO_FEW = "found", "no motion", "too few gyros"
 FALSE_ALARM = 0.01  # chance that a recording of equal gyros shows a delay at all
@@ -51,16 +51,16 @@ class Delays(NamedTuple):
 class _Shifted(NamedTuple):
     """All gyros on one time, each shifted by its delay."""
 
-    blocks: Blocks
+    blocks: SampleBlocks
     rate: np.ndarray  # [N, K], slow drift removed
     slope: np.ndarray  # [N, K]
 
 
-class _Fit(NamedTuple):
+class _DelayFit(NamedTuple):
     delay: np.ndarray  # [N], s, weighted mean zero
     influence: np.ndarray  # [N, K]: an error of the delay is the sum of mean slope · this
     slope: np.ndarray  # [K], of the common motion
-    blocks: Blocks
+    blocks: SampleBlocks
 
 
 def relative_delays(
@@ -87,7 +87,7 @@ def relative_delays(
         return _none(gyros, NO_MOTION)
     # Stretches of the recording that do not touch lie apart in time, so that nothing is read across a gap.
     time = (rows + 2.0 * segment[rows]) / rate_hz
-    streams = [Stream(time, rate[rows, k].astype(float), rate_hz) for k in columns]
+    streams = [AlignedStream(time, rate[rows, k].astype(float), rate_hz) for k in columns]
     highest = highest_cutoff(rate_hz)
     start = _first_delays([low_pass(stream, min(SLOW_HZ, highest)) for stream in streams])
     best: tuple[np.ndarray, np.ndarray] | None = None
@@ -121,7 +121,7 @@ def _first_delays(bands: list[Band]) -> np.ndarray:
     for k, band in enumerate(bands[1:], start=1):
         if len(band.time) < 2:
             continue
-        agreed = agreement(first, band, rows, number, [Line(0.0, lag, 0.0) for lag in tried])
+        agreed = agreement(first, band, rows, number, [ClockRelation(0.0, lag, 0.0) for lag in tried])
         padded = np.pad(agreed, 1)
         peak = (agreed >= padded[:-2]) & (agreed >= padded[2:]) & (agreed >= NEARLY * agreed.max())
         delays[k] = min(tried[peak], key=abs)
@@ -141,11 +141,11 @@ def _shift(bands: list[Band], delay: np.ndarray) -> _Shifted | None:
     good &= np.bincount(number, good)[number] * first.step_s >= SHORTEST_S
     if np.count_nonzero(good) * first.step_s < SHORTEST_S:
         return None
-    blocks = Blocks(np.flatnonzero(good), number[good], first.step_s)
+    blocks = SampleBlocks(np.flatnonzero(good), number[good], first.step_s)
     return _Shifted(blocks, blocks.detrended(rate[:, good]), blocks.detrended(slope[:, good]))
 
 
-def _fit(bands: list[Band], delay: np.ndarray) -> _Fit | None:
+def _fit(bands: list[Band], delay: np.ndarray) -> _DelayFit | None:
     if min(len(band.time) for band in bands) < 2:
         return None
     weight = np.full(len(bands), 1 / len(bands))
@@ -175,7 +175,7 @@ def _fit(bands: list[Band], delay: np.ndarray) -> _Fit | None:
             break
     if shifted is None:
         return None
-    return _Fit(delay, influence, mean_slope, shifted.blocks)
+    return _DelayFit(delay, influence, mean_slope, shifted.blocks)
 
 
 def _scales(rate: np.ndarray) -> np.ndarray:
@@ -192,7 +192,7 @@ def _scales(rate: np.ndarray) -> np.ndarray:
     return scale
 
 
-def _against_the_group(fit: _Fit, tolerance_s: float) -> tuple[np.ndarray, np.ndarray]:
+def _against_the_group(fit: _DelayFit, tolerance_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Delays against the mean of the gyros that agree, and their standard errors: [N], [N]."""
     gyros = len(fit.delay)
     everyone = np.ones(gyros, dtype=bool)
@@ -204,7 +204,7 @@ def _against_the_group(fit: _Fit, tolerance_s: float) -> tuple[np.ndarray, np.nd
     return _contrast(fit, group)
 
 
-def _contrast(fit: _Fit, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _contrast(fit: _DelayFit, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     contrast = np.eye(len(group)) - group / group.sum()
     error = [np.sqrt(score_covariance(fit.blocks, fit.slope[None], row @ fit.influence)[0, 0]) for row in contrast]
     return contrast @ fit.delay, np.array(error)

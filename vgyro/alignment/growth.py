@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from vgyro.alignment.blocks import block_numbers
-from vgyro.alignment.coarse import SMEAR_S, Candidate
-from vgyro.alignment.pair import Line, PairFit, agreement, fit_line
+from vgyro.alignment.coarse import SMEAR_S, LineCandidate
+from vgyro.alignment.pair import ClockRelation, PairFit, agreement, fit_line
 from vgyro.alignment.streams import Band
 
 MOST_BLOCKS = 300
@@ -24,7 +24,7 @@ REACH = 3.0  # standard errors of the drift that are searched
 NEAR_S = 0.02  # lines that differ by less, everywhere, are one
 
 
-def grow(reference: Band, other: Band, candidates: list[Candidate], most_drift: float) -> list[PairFit]:
+def grow(reference: Band, other: Band, candidates: list[LineCandidate], most_drift: float) -> list[PairFit]:
     """Fits over all of the recording, from candidates found in pieces of it; the likely ones, best first.
 
     The piece in which the streams agree most is the seed. It tells the drift too badly to know where the next motion,
@@ -61,7 +61,7 @@ def likely(fits: list[PairFit | None]) -> list[PairFit]:
 def fit_window(
     reference: Band,
     other: Band,
-    line: Line,
+    line: ClockRelation,
     most_drift: float,
     window: tuple[float, float],
     most_blocks: int = FEWER_BLOCKS,
@@ -76,7 +76,9 @@ def fit_window(
     return fit_line(reference, other, rows, number, line, drift=False)
 
 
-def _starts(reference: Band, other: Band, fit: PairFit, most_drift: float, window: tuple[float, float]) -> list[Line]:
+def _starts(
+    reference: Band, other: Band, fit: PairFit, most_drift: float, window: tuple[float, float]
+) -> list[ClockRelation]:
     """Lines with the drifts that agree best over a longer window."""
     line, error = fit.line, math.sqrt(fit.covariance[1, 1])
     spread = min(REACH * error, most_drift)
@@ -133,6 +135,6 @@ def apart(one: PairFit, two: PairFit) -> float:
     return max(gaps)
 
 
-def offset(line: Line) -> float:
+def offset(line: ClockRelation) -> float:
     """Time of the reference at which the other clock reads 0."""
     return (line.drift * line.centre_s - line.lag_s) / (1 + line.drift)

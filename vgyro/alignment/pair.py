@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vgyro.alignment.blocks import SHORTEST_S, Blocks, independent_values, score_covariance
+from vgyro.alignment.blocks import SHORTEST_S, SampleBlocks, independent_values, score_covariance
 from vgyro.alignment.interpolation import interpolate
 from vgyro.alignment.streams import Band
 from vgyro.units import Quantity
@@ -21,7 +21,7 @@ STANDS_OUT = 2.0  # power of a block in motion over that of the quiet ones
 AGREED = 0.5  # correlation of two streams in which the motion has the power of the noise
 
 
-class Line(NamedTuple):
+class ClockRelation(NamedTuple):
     """Readings of the other clock: reading = t + lag_s + drift · (t - centre_s), t on the reference's clock."""
 
     centre_s: float
@@ -32,9 +32,9 @@ class Line(NamedTuple):
         """Readings of the other clock at times of the reference's, s: a float or [M]."""
         return time + self.lag_s + self.drift * (time - self.centre_s)
 
-    def about(self, centre_s: float) -> Line:
+    def about(self, centre_s: float) -> ClockRelation:
         """The same line with another centre."""
-        return Line(centre_s, self.lag_s + self.drift * (centre_s - self.centre_s), self.drift)
+        return ClockRelation(centre_s, self.lag_s + self.drift * (centre_s - self.centre_s), self.drift)
 
 
 class PairFit(NamedTuple):
@@ -50,7 +50,7 @@ class PairFit(NamedTuple):
     cutoff_hz   : band of the fit
     """
 
-    line: Line
+    line: ClockRelation
     covariance: np.ndarray
     correlation: float
     scale: float
@@ -61,14 +61,14 @@ class PairFit(NamedTuple):
 
 
 class _Overlap(NamedTuple):
-    blocks: Blocks
+    blocks: SampleBlocks
     time: np.ndarray
     columns: np.ndarray  # reference, its derivative, other, its derivative: [4, K], detrended
     raw: np.ndarray
 
 
 def fit_line(
-    reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, start: Line, drift: bool = True
+    reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, start: ClockRelation, drift: bool = True
 ) -> PairFit | None:
     """Least residual of other(line(t)) - scale · reference(t), with a level and a slope for each block.
 
@@ -105,7 +105,7 @@ def fit_line(
         step = -inverse @ (slopes @ residual)
         error = np.sqrt(np.diag(inverse) * float(residual @ residual) / len(residual))
         step *= min(1.0, farthest / max(abs(step[0]), 1e-30))
-        line = Line(line.centre_s, line.lag_s + step[0], line.drift + (step[1] if drift else 0.0))
+        line = ClockRelation(line.centre_s, line.lag_s + step[0], line.drift + (step[1] if drift else 0.0))
         if abs(line.lag_s - start.about(line.centre_s).lag_s) > 4 * farthest:
             return None
         if (np.abs(step) < SMALL_STEP * error).all():
@@ -123,7 +123,9 @@ def fit_line(
     return PairFit(line, covariance, correlation, scale, seconds, worth, reach, reference.cutoff_hz)
 
 
-def agreement(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, lines: list[Line]) -> np.ndarray:
+def agreement(
+    reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, lines: list[ClockRelation]
+) -> np.ndarray:
     """Correlation of the two, without its sign, for each line: [n].
 
     Read along straight lines between samples, which is near enough to choose.
@@ -137,7 +139,7 @@ def agreement(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray
         good = (before >= 0) & known[before]
         if np.count_nonzero(good) < FEWEST_POINTS:
             continue
-        blocks = Blocks(rows[good], number[good], reference.step_s)
+        blocks = SampleBlocks(rows[good], number[good], reference.step_s)
         one, two = blocks.detrended(np.stack([reference.rate[rows[good]], np.interp(at[good], other.time, other.rate)]))
         result[k] = abs(one @ two) / max(math.sqrt(float(one @ one) * float(two @ two)), 1e-300)
     return result
@@ -152,7 +154,9 @@ def _bread(overlap: _Overlap, lever: np.ndarray, scale: float) -> np.ndarray:
     return 0.5 * (product + product.T)
 
 
-def _overlap(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, line: Line) -> _Overlap | None:
+def _overlap(
+    reference: Band, other: Band, rows: np.ndarray, number: np.ndarray, line: ClockRelation
+) -> _Overlap | None:
     time = reference.time[rows]
     places = np.interp(line.at(time), other.time, np.arange(len(other.time), dtype=float), left=np.nan, right=np.nan)
     two, slope = rate_and_slope(other, places)
@@ -162,13 +166,13 @@ def _overlap(reference: Band, other: Band, rows: np.ndarray, number: np.ndarray,
     if np.count_nonzero(good) < FEWEST_POINTS:
         return None
     kept = rows[good]
-    blocks = Blocks(kept, number[good], reference.step_s)
+    blocks = SampleBlocks(kept, number[good], reference.step_s)
     raw = np.stack([reference.rate[kept], reference.derivative[kept], two[good], slope[good]])
     columns = blocks.detrended(raw)
     moving = _moving(blocks, columns)[blocks.block]
     if not moving.all():
         blocks, raw, columns = (
-            Blocks(kept[moving], blocks.block[moving], reference.step_s),
+            SampleBlocks(kept[moving], blocks.block[moving], reference.step_s),
             raw[:, moving],
             columns[:, moving],
         )
@@ -183,7 +187,7 @@ def rate_and_slope(band: Band, places: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return both.real, both.imag
 
 
-def _moving(blocks: Blocks, columns: np.ndarray) -> np.ndarray:
+def _moving(blocks: SampleBlocks, columns: np.ndarray) -> np.ndarray:
     """Blocks in which one of the two moves: [B]; all, if the others agree too, or if none stands out.
 
     The noise of a block at rest is far from the centre of the information and would count there as information about

@@ -16,7 +16,7 @@ OVERSAMPLING = 5.0  # rate of the thinned series over the cut-off; its stop band
 STOP_DB = 60.0
 
 
-class Stream(NamedTuple):
+class AlignedStream(NamedTuple):
     """One gyro, or the mean of one board's gyros, on its own clock.
 
     time    : array [T], s, readings of its own clock, rising and even between gaps
@@ -54,7 +54,7 @@ def stretches(time: np.ndarray, rate_hz: float) -> np.ndarray:
     return np.concatenate(([0], np.cumsum((steps > GAP / rate_hz) | (steps <= 0))))
 
 
-def resample(stream: Stream, time: np.ndarray) -> np.ndarray:
+def resample(stream: AlignedStream, time: np.ndarray) -> np.ndarray:
     """The stream at other readings of its own clock: time [M] s → array [M], deg/s; NaN in gaps and outside.
 
     Band-limited, see `interpolate`; a ClockFit turns times of another clock into readings of this one.
@@ -62,7 +62,7 @@ def resample(stream: Stream, time: np.ndarray) -> np.ndarray:
     return interpolate(stream.rate, positions(stream, time), stretches(stream.time, stream.rate_hz))
 
 
-def positions(stream: Stream, time: np.ndarray) -> np.ndarray:
+def positions(stream: AlignedStream, time: np.ndarray) -> np.ndarray:
     """Readings of a stream's clock as positions in its samples, for `noise_gain`: [M] s → [M]; NaN outside."""
     return np.interp(time, stream.time, np.arange(len(stream.time), dtype=float), left=np.nan, right=np.nan)
 
@@ -72,7 +72,7 @@ def highest_cutoff(rate_hz: float) -> float:
     return rate_hz / OVERSAMPLING
 
 
-def low_pass(stream: Stream, cutoff_hz: float) -> Band:
+def low_pass(stream: AlignedStream, cutoff_hz: float) -> Band:
     """A stream below cutoff_hz, at five times that rate or a little more.
 
     Stamps pass the same filter, so that jitter of stamps averages out. Holes of up to three samples are bridged by a
@@ -124,7 +124,7 @@ def _thin(taps: np.ndarray, values: np.ndarray, factor: int, count: int) -> np.n
     return out[first : first + count]
 
 
-def _usable(stream: Stream) -> list[tuple[int, int]]:
+def _usable(stream: AlignedStream) -> list[tuple[int, int]]:
     """Stretches without gaps and without long holes, from a good sample to a good sample."""
     good = np.isfinite(stream.rate) & np.isfinite(stream.time)
     kept = np.flatnonzero(good)

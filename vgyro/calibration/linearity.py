@@ -6,7 +6,7 @@ import numpy as np
 
 from vgyro import units
 from vgyro.calibration.figures import Finding, not_measured, signed, unsigned
-from vgyro.calibration.response import SAME_RATE, Response
+from vgyro.calibration.response import SAME_RATE, RateResponse
 from vgyro.calibration.sizes import DRAWS, Size, largest, noise_draws, root_mean_square, size_and_limits
 from vgyro.calibration.wandering import student
 
@@ -15,7 +15,7 @@ MEDIAN_OF_NOISE = 0.6745  # of |x|, x standard normal
 ROUGH = "no smooth curve: every rate for itself"
 
 
-def nonlinearity(response: Response, scale: float, full_scale: float, confidence: float) -> dict[str, Finding]:
+def nonlinearity(response: RateResponse, scale: float, full_scale: float, confidence: float) -> dict[str, Finding]:
     """The three nonlinearities, ppm: largest over full scale, largest over reading, r.m.s. over full scale.
 
     scale : deg/s a count;  full_scale : deg/s
@@ -41,7 +41,7 @@ def nonlinearity(response: Response, scale: float, full_scale: float, confidence
     return findings
 
 
-def asymmetry(response: Response, confidence: float) -> Finding:
+def asymmetry(response: RateResponse, confidence: float) -> Finding:
     """(S⁺ - S⁻) / S, ppm: least-squares slopes of the plateaus from 0 up and from 0 down, over the mean of the two."""
     up, down = response.half_slope(1), response.half_slope(-1)
     if up is None or down is None:
@@ -50,7 +50,7 @@ def asymmetry(response: Response, confidence: float) -> Finding:
     return combined(response, units.parts_per_million((up - down) / mean), confidence)
 
 
-def hysteresis(response: Response, scale: float, full_scale: float, confidence: float) -> Finding:
+def hysteresis(response: RateResponse, scale: float, full_scale: float, confidence: float) -> Finding:
     """Largest |up - down| over full scale, ppm; scale deg/s a count, full_scale deg/s."""
     if not len(response.loop):
         return not_measured("needs three rates or more that are reached both from below and from above")
@@ -58,7 +58,7 @@ def hysteresis(response: Response, scale: float, full_scale: float, confidence: 
     return _size(response, factor * response.loop, factor * response.seen_loop, largest, confidence)
 
 
-def zero_shift(response: Response, scale: float, confidence: float) -> Finding:
+def zero_shift(response: RateResponse, scale: float, confidence: float) -> Finding:
     """Last plateau at zero rate minus the first, deg/h; scale deg/s a count, with the gyro's sign.
 
     The limits allow for the noise of the two means, slow noise included.
@@ -75,7 +75,7 @@ def zero_shift(response: Response, scale: float, confidence: float) -> Finding:
     return signed(factor * float(visits.count[last] - visits.count[first]), half, MEDIAN_OF_NOISE * error)
 
 
-def zero_offset(response: Response, scale: float, confidence: float) -> Finding:
+def zero_offset(response: RateResponse, scale: float, confidence: float) -> Finding:
     """Output at zero rate minus that of the straight line, deg/h; scale deg/s a count, with the gyro's sign."""
     at_zero = np.flatnonzero(np.abs(response.model.rates) <= SAME_RATE * response.model.visits.largest)
     if not at_zero.size or not response.bends:
@@ -83,7 +83,7 @@ def zero_offset(response: Response, scale: float, confidence: float) -> Finding:
     return combined(response, float(units.deg_h(scale)) * response.bend[at_zero[0]], confidence)
 
 
-def combined(response: Response, combination: np.ndarray, confidence: float, note: str = "") -> Finding:
+def combined(response: RateResponse, combination: np.ndarray, confidence: float, note: str = "") -> Finding:
     """A figure with a sign that is a combination [p] of the coefficients."""
     fit = response.fit
     floor = MEDIAN_OF_NOISE * fit.standard_error(combination)
@@ -91,7 +91,7 @@ def combined(response: Response, combination: np.ndarray, confidence: float, not
 
 
 def _size(
-    response: Response, combination: np.ndarray, seen: np.ndarray, size: Size, confidence: float, note: str = ""
+    response: RateResponse, combination: np.ndarray, seen: np.ndarray, size: Size, confidence: float, note: str = ""
 ) -> Finding:
     """A figure that is the size of combinations [J, p]; `seen` [J, P] gives the floor."""
     fit = response.fit

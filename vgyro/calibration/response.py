@@ -46,7 +46,7 @@ class Visits:
 
 
 @dataclass(frozen=True)
-class Model:
+class ResponseModel:
     """Columns of the model: constant, rate, bend [J, q] by the number of the rate, then loop and drift [P, ...].
 
     rates [J] : the different ones, deg/s;  group [P] : number of each plateau's
@@ -72,7 +72,7 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Response:
+class RateResponse:
     """The model fitted to P plateaus at J different rates, H of them reached from both sides; p coefficients.
 
     bias, slope [p] : combinations of the coefficients that are the straight line, counts, counts/(deg/s)
@@ -82,7 +82,7 @@ class Response:
     smooth          : False where every rate has a number of its own
     """
 
-    model: Model
+    model: ResponseModel
     fit: LinearFit
     bias: np.ndarray
     slope: np.ndarray
@@ -124,7 +124,7 @@ def same_rates(rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.bincount(group, weights=rate) / np.bincount(group), group
 
 
-def fit_response(visits: Visits) -> Response:
+def fit_response(visits: Visits) -> RateResponse:
     """Fit the model to the plateaus of one gyro at 3 different rates or more.
 
     The white variance of a plateau goes with 1 / seconds; its slow noise is allowed for by `Errors`. A drift is fitted
@@ -138,10 +138,10 @@ def fit_response(visits: Visits) -> Response:
     loop = visits.direction[:, None] / 2 * _loop_shape(visits.rate / visits.largest, loops)
     bend = _smooth_bend(rates)
     drift = _drift(visits, np.hstack([straight(visits.rate), bend[group], loop]))
-    smooth = Model(visits, rates, group, pairs, bend, loop, drift)
+    smooth = ResponseModel(visits, rates, group, pairs, bend, loop, drift)
     errors = Errors(len(visits.rate), 1 / visits.seconds, visits.time, visits.seconds)
     fit = smooth.fit(errors)
-    free = Model(visits, rates, group, pairs, _free_bend(rates), loop, drift)
+    free = ResponseModel(visits, rates, group, pairs, _free_bend(rates), loop, drift)
     if _refused(smooth, free, fit):
         return _response(free, free.fit(errors), smooth=False)
     return _response(smooth, fit, smooth=True)
@@ -152,7 +152,7 @@ def straight(rate: np.ndarray) -> np.ndarray:
     return np.column_stack([np.ones_like(rate), rate])
 
 
-def _response(model: Model, fit: LinearFit, smooth: bool) -> Response:
+def _response(model: ResponseModel, fit: LinearFit, smooth: bool) -> RateResponse:
     visits, rates, group, pairs = model.visits, model.rates, model.group, model.pairs
     loops, drifts = model.loop.shape[1], model.drift.shape[1]
     transfer = np.hstack([straight(rates), model.bend, np.zeros((len(rates), loops + drifts))])
@@ -169,12 +169,12 @@ def _response(model: Model, fit: LinearFit, smooth: bool) -> Response:
     is_other = np.arange(design.shape[1]) >= before
     seen_bend = _averaging(at_rate) @ _left_by(straight(visits.rate)) @ _taken_off(design, found, is_other)
     seen_loop = (up - down) @ _taken_off(design, found, ~is_loop)
-    return Response(
+    return RateResponse(
         model, fit, line[0], line[1], transfer, transfer - straight(rates) @ line, loop, seen_bend, seen_loop, smooth
     )
 
 
-def _refused(smooth: Model, free: Model, fit: LinearFit) -> bool:
+def _refused(smooth: ResponseModel, free: ResponseModel, fit: LinearFit) -> bool:
     """Do repeated visits show that the response bends more than the smooth curve can? F test at 1 %."""
     from scipy.special import fdtrc
 

@@ -11,7 +11,7 @@ from vgyro import units
 from vgyro.calibration.figures import BELOW, Finding, not_measured
 from vgyro.calibration.linearity import asymmetry, combined, hysteresis, nonlinearity, zero_offset, zero_shift
 from vgyro.calibration.plateaus import PlateauMeans
-from vgyro.calibration.response import Response, Visits, fit_response, same_rates
+from vgyro.calibration.response import RateResponse, Visits, fit_response, same_rates
 from vgyro.errors import DataError, TooShort
 
 FEWEST_RATES = 3
@@ -137,7 +137,7 @@ def cross_axis(means: PlateauMeans, gyros: list[GyroNominal], confidence: float 
     return findings
 
 
-def _respond(means: PlateauMeans, column: int) -> Response | None:
+def _respond(means: PlateauMeans, column: int) -> RateResponse | None:
     usable = np.isfinite(means.mean[:, column])
     rate, count = means.rate[usable], means.mean[usable, column]
     if same_rates(rate)[0].size < FEWEST_RATES:
@@ -146,7 +146,7 @@ def _respond(means: PlateauMeans, column: int) -> Response | None:
 
 
 def _scale_fit(
-    response: Response, means: PlateauMeans, column: int, gyro: GyroNominal, earth: float, confidence: float
+    response: RateResponse, means: PlateauMeans, column: int, gyro: GyroNominal, earth: float, confidence: float
 ) -> ScaleFit:
     fit, visits, usable = response.fit, response.model.visits, np.isfinite(means.mean[:, column])
     slope = float(response.slope @ fit.estimate)
@@ -179,7 +179,7 @@ def _scale_fit(
 
 
 def _note(
-    response: Response, scale: float, gyro: GyroNominal, full_scale: float, error: np.ndarray, bend: Finding
+    response: RateResponse, scale: float, gyro: GyroNominal, full_scale: float, error: np.ndarray, bend: Finding
 ) -> str:
     notes = [f"full scale {full_scale:g} deg/s"]
     if bend.state == BELOW:

@@ -32,7 +32,7 @@ from vgyro.storage.dumps.sniff import probe
 from vgyro.storage.inputs import data_files
 from vgyro.storage.integrity import Integrity
 from vgyro.storage.sources import open_sources
-from vgyro.tasks.calibration.tables import Source, plateaus_of
+from vgyro.tasks.calibration.tables import RecordingSource, plateaus_of
 from vgyro.tasks.inputs_check import MANIFEST, Dataset, reference_file
 from vgyro.validation import Problem, locate
 
@@ -42,7 +42,7 @@ MOVING = 0.01  # share of a recording at rest in which the board may move withou
 
 
 @dataclass(frozen=True)
-class Head:
+class DataHead:
     """The beginning of a recording, or all of it.
 
     values : [T, N], of the gyros, as sent;  time : [T] s;  whole : nothing was left out
@@ -56,7 +56,7 @@ class Head:
 
 
 @dataclass(frozen=True)
-class Finding:
+class DataFinding:
     """Where in a manifest something seems wrong, and what."""
 
     key: str
@@ -85,7 +85,7 @@ def check_data(dataset: Dataset, boards: Path) -> tuple[list[Problem], list[Prob
 
 def _of_recording(
     key: str, recording: Recording, manifest: Manifest, board: Board, folder: Path, boards: Path
-) -> Iterator[Finding]:
+) -> Iterator[DataFinding]:
     paths = data_files(manifest, recording.name, folder)
     try:
         head = read_head(paths, recording, board, boards, manifest.array)
@@ -95,27 +95,27 @@ def _of_recording(
             else diagnose(probe(open_sources(paths), board).head, board)
         )
     except VgyroError as error:
-        yield Finding(f"{key}.files", Suspicion(str(error), True))
+        yield DataFinding(f"{key}.files", Suspicion(str(error), True))
         return
-    yield from (Finding(f"{key}.files", Suspicion(text, True)) for text in advice)
+    yield from (DataFinding(f"{key}.files", Suspicion(text, True)) for text in advice)
     if not len(head.time):
         return
     names = [gyro.name for gyro in board.gyros]
     # Identical numbers of one channel are named by the board alone.
     yield from (
-        Finding(key, one)
+        DataFinding(key, one)
         for one in [*shared_channels(names, [gyro.field for gyro in board.gyros]), *_same(head, board, names)]
     )
-    yield from (Finding(_rate_key(key, recording), one) for one in _rate(head, recording, board))
+    yield from (DataFinding(_rate_key(key, recording), one) for one in _rate(head, recording, board))
     yield from _times(key, head, recording)
-    yield from (Finding(key, one) for one in _moves(head, recording, board))
+    yield from (DataFinding(key, one) for one in _moves(head, recording, board))
     if recording.kind == "calibration" and values_of(manifest, recording) == "counts":
         yield from _table(key, head, recording, board, folder, manifest)
 
 
 def read_head(
     paths: list[Path], recording: Recording, board: Board, boards: Path, array: LogArray | None = None
-) -> Head:
+) -> DataHead:
     """Read a recording, up to MOST_VALUES.  raises : DataError, ConfigError"""
     reader = open_recording(paths, recording, board, IntegrityOptions(), boards=boards, array=array)
     most = max(FEWEST_ROWS, MOST_VALUES // len(board.gyros))
@@ -128,11 +128,11 @@ def read_head(
         if rows > most:
             break
     if not columns:
-        return Head(np.empty((0, len(fields))), np.empty(0), reader.integrity is not None, reader.integrity)
-    return Head(np.concatenate(columns), np.concatenate(times), reader.integrity is not None, reader.integrity)
+        return DataHead(np.empty((0, len(fields))), np.empty(0), reader.integrity is not None, reader.integrity)
+    return DataHead(np.concatenate(columns), np.concatenate(times), reader.integrity is not None, reader.integrity)
 
 
-def _same(head: Head, board: Board, names: list[str]) -> list[Suspicion]:
+def _same(head: DataHead, board: Board, names: list[str]) -> list[Suspicion]:
     first = [
         place for place, gyro in enumerate(board.gyros) if gyro.field not in [g.field for g in board.gyros[:place]]
     ]
@@ -143,7 +143,7 @@ def _rate_key(key: str, recording: Recording) -> str:
     return f"{key}.rate_hz" if recording.rate_hz is not None else key
 
 
-def _rate(head: Head, recording: Recording, board: Board) -> list[Suspicion]:
+def _rate(head: DataHead, recording: Recording, board: Board) -> list[Suspicion]:
     declared = recording.rate_hz or board.rate_hz
     measured = head.integrity.measured_rate_hz if head.integrity else None
     if declared is None or measured is None:
@@ -152,21 +152,21 @@ def _rate(head: Head, recording: Recording, board: Board) -> list[Suspicion]:
     return [found] if found else []
 
 
-def _times(key: str, head: Head, recording: Recording) -> Iterator[Finding]:
+def _times(key: str, head: DataHead, recording: Recording) -> Iterator[DataFinding]:
     """Plateaus and rests after the end of the recording."""
     if not head.whole or head.integrity is None:
         return
     end = head.integrity.duration_s
     if recording.rest != "auto":
         for number, one in outside_recording("rest", list(recording.rest), end):
-            yield Finding(f"{key}.rest.{number}", one)
+            yield DataFinding(f"{key}.rest.{number}", one)
     if isinstance(recording.reference, PlateauReference):
         spans = [(plateau.start, plateau.stop) for plateau in recording.reference.plateaus]
         for number, one in outside_recording("plateau", spans, end):
-            yield Finding(f"{key}.reference.plateaus.{number}", one)
+            yield DataFinding(f"{key}.reference.plateaus.{number}", one)
 
 
-def _moves(head: Head, recording: Recording, board: Board) -> list[Suspicion]:
+def _moves(head: DataHead, recording: Recording, board: Board) -> list[Suspicion]:
     """A recording that is declared to be at rest, and is not."""
     if recording.kind not in AT_REST or recording.rest != "auto" or len(head.time) < 2:
         return []
@@ -184,14 +184,14 @@ def _moves(head: Head, recording: Recording, board: Board) -> list[Suspicion]:
 
 
 def _table(
-    key: str, head: Head, recording: Recording, board: Board, folder: Path, manifest: Manifest
-) -> Iterator[Finding]:
+    key: str, head: DataHead, recording: Recording, board: Board, folder: Path, manifest: Manifest
+) -> Iterator[DataFinding]:
     """A rate-table recording: are the plateaus where they are said to be, and the rates in deg/s?"""
     log = reference_file(manifest, recording.name, folder) if isinstance(recording.reference, FileReference) else None
     try:
-        plateaus = list(plateaus_of(Source(recording, folder, math.nan, log), CalibrationOptions()))
+        plateaus = list(plateaus_of(RecordingSource(recording, folder, math.nan, log), CalibrationOptions()))
     except VgyroError as error:
-        yield Finding(f"{key}.reference", Suspicion(str(error), True))
+        yield DataFinding(f"{key}.reference", Suspicion(str(error), True))
         return
     axis = recording.axis or board.axes[0]
     chosen = [place for place, gyro in enumerate(board.gyros) if gyro.axis == axis]
@@ -200,11 +200,11 @@ def _table(
     shift = plateau_shift(values, head.time, plateaus)
     if shift is not None:
         text = f"the gyros are not steady on the plateaus: moving all plateaus by {shift:+.1f} s makes them steady"
-        yield Finding(where, Suspicion(text, True))
+        yield DataFinding(where, Suspicion(text, True))
         plateaus = [(start + shift, stop + shift, rate) for start, stop, rate in plateaus]
     inside = [plateau for plateau in plateaus if plateau[0] >= 0 and plateau[1] <= head.time[-1] + 1.0]
-    yield from (Finding(where, one) for one in unsteady_plateaus(values, head.time, inside))
+    yield from (DataFinding(where, one) for one in unsteady_plateaus(values, head.time, inside))
     rails = (board.adc.low, board.adc.high) if board.adc else None
     means = average_plateaus(values, head.time, inside, rails, whole_turns=False)
     relative = relative_scales(means.mean, means.rate, [g.sign for g in gyros], [g.scale for g in gyros])
-    yield from (Finding(where, one) for one in scale_suspicions([gyro.name for gyro in gyros], relative))
+    yield from (DataFinding(where, one) for one in scale_suspicions([gyro.name for gyro in gyros], relative))

@@ -29,7 +29,7 @@ SAME, WITHIN, BEYOND, ONLY_A, ONLY_B = "same", "within the intervals", "beyond t
 
 
 @dataclass(frozen=True)
-class Figure:
+class ComparedFigure:
     """A figure with its 95 % interval; NaN where none is given."""
 
     value: float
@@ -39,7 +39,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Change:
+class FigureChange:
     """One figure in both runs; a value is None where a run lacks it or could not compute it."""
 
     figure: str
@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
     return int(bool(different))
 
 
-def compare(a: dict[str, Figure], b: dict[str, Figure], tolerance: float) -> list[Change]:
+def compare(a: dict[str, ComparedFigure], b: dict[str, ComparedFigure], tolerance: float) -> list[FigureChange]:
     """Match two sets of figures by name, in the order of A, then what only B has."""
     changes = []
     for name in dict.fromkeys([*a, *b]):
@@ -86,7 +86,7 @@ def compare(a: dict[str, Figure], b: dict[str, Figure], tolerance: float) -> lis
             assert known is not None
             verdict = ONLY_A if second is None else ONLY_B
             changes.append(
-                Change(name, _number(first), _number(second), None, None, known.unit, verdict),
+                FigureChange(name, _number(first), _number(second), None, None, known.unit, verdict),
             )
             continue
         difference = second.value - first.value
@@ -94,12 +94,14 @@ def compare(a: dict[str, Figure], b: dict[str, Figure], tolerance: float) -> lis
         relative = 0.0 if size == 0 else difference / size
         verdict = _verdict(first, second, tolerance)
         changes.append(
-            Change(name, _number(first), _number(second), _finite(difference), _finite(relative), second.unit, verdict)
+            FigureChange(
+                name, _number(first), _number(second), _finite(difference), _finite(relative), second.unit, verdict
+            )
         )
     return changes
 
 
-def read_figures(path: Path) -> dict[str, Figure]:
+def read_figures(path: Path) -> dict[str, ComparedFigure]:
     """All figures below a folder, or of one metrics.parquet.
 
     Several data sets in one folder are told apart by the name of their folder.
@@ -126,11 +128,11 @@ def read_figures(path: Path) -> dict[str, Figure]:
             names += [f"at {rate:g} deg/s"] if rate else []
             name = " ".join(part for part in names if part)
             value, low, high = (float(table[column][row]) for column in ("value", "low", "high"))
-            figures[name] = Figure(value, low, high, str(table["unit"][row]))
+            figures[name] = ComparedFigure(value, low, high, str(table["unit"][row]))
     return figures
 
 
-def _verdict(a: Figure, b: Figure, tolerance: float) -> str:
+def _verdict(a: ComparedFigure, b: ComparedFigure, tolerance: float) -> str:
     if math.isnan(a.value) and math.isnan(b.value):
         return SAME
     if a.unit == b.unit and (
@@ -141,7 +143,7 @@ def _verdict(a: Figure, b: Figure, tolerance: float) -> str:
     return WITHIN if inside and a.unit == b.unit else BEYOND
 
 
-def _line(change: Change) -> str:
+def _line(change: FigureChange) -> str:
     def text(value: float | None) -> str:
         return "–" if value is None else f"{value:.6g}"
 
@@ -149,7 +151,7 @@ def _line(change: Change) -> str:
     return f"{change.figure}: {text(change.a)} → {text(change.b)} {change.unit}{share}, {change.verdict}"
 
 
-def _number(figure: Figure | None) -> float | None:
+def _number(figure: ComparedFigure | None) -> float | None:
     return None if figure is None else _finite(figure.value)
 
 

@@ -35,7 +35,7 @@ RENEW = "make env"
 
 
 @dataclass(frozen=True)
-class Finding:
+class MachineFinding:
     """One line of the answer.   state : ok, missing, or optional (not there, and not needed for the pipeline)"""
 
     state: str
@@ -61,83 +61,87 @@ def run(options: argparse.Namespace) -> int:
     return int(any(finding.state == "missing" for finding in findings))
 
 
-def _python() -> Iterator[Finding]:
+def _python() -> Iterator[MachineFinding]:
     found = ".".join(map(str, sys.version_info[:3]))
     if sys.version_info >= OLDEST_PYTHON:
-        yield Finding("ok", f"Python {found}")
+        yield MachineFinding("ok", f"Python {found}")
     else:
         wanted = ".".join(map(str, OLDEST_PYTHON))
-        yield Finding(
+        yield MachineFinding(
             "missing", f"Python {wanted} or newer (this is {found})", "apt install python3.11 python3.11-venv"
         )
 
 
-def _compiler() -> Iterator[Finding]:
+def _compiler() -> Iterator[MachineFinding]:
     path = next(filter(None, map(shutil.which, COMPILERS)), None)
     if path:
-        yield Finding("ok", f"C compiler: {path}")
+        yield MachineFinding("ok", f"C compiler: {path}")
     else:
-        yield Finding("missing", "C compiler (cc, gcc or clang)", "apt install gcc libc6-dev")
+        yield MachineFinding("missing", "C compiler (cc, gcc or clang)", "apt install gcc libc6-dev")
 
 
-def _engine() -> Iterator[Finding]:
+def _engine() -> Iterator[MachineFinding]:
     try:
         from vgyro.engine.native import _cpu
     except ImportError:
-        yield Finding("missing", "the native engine is not built", RENEW)
+        yield MachineFinding("missing", "the native engine is not built", RENEW)
     else:
-        yield Finding("ok", f"native engine, for {_cpu.instruction_set()}")
+        yield MachineFinding("ok", f"native engine, for {_cpu.instruction_set()}")
 
 
-def _packages(lock: Path) -> Iterator[Finding]:
+def _packages(lock: Path) -> Iterator[MachineFinding]:
     """Each package that vgyro needs, and whether its version is the locked one."""
     locked = _locked_versions(lock)
     if not locked:
-        yield Finding("missing", f"lock file {lock}", "run vgyro doctor in the project's folder, or give --lock")
+        yield MachineFinding("missing", f"lock file {lock}", "run vgyro doctor in the project's folder, or give --lock")
     for name in _needed():
         wanted = locked.get(_normal(name))
         try:
             found = metadata.version(name)
         except metadata.PackageNotFoundError:
-            yield Finding("missing", f"package {name} {' or '.join(sorted(wanted or ()))}".rstrip(), RENEW)
+            yield MachineFinding("missing", f"package {name} {' or '.join(sorted(wanted or ()))}".rstrip(), RENEW)
             continue
         if wanted and found not in wanted:
-            yield Finding("missing", f"package {name} {found}, locked is {' or '.join(sorted(wanted))}", RENEW)
+            yield MachineFinding("missing", f"package {name} {found}, locked is {' or '.join(sorted(wanted))}", RENEW)
         else:
-            yield Finding("ok", f"package {name} {found}")
+            yield MachineFinding("ok", f"package {name} {found}")
 
 
-def _programs() -> Iterator[Finding]:
+def _programs() -> Iterator[MachineFinding]:
     # The one beside this Python, as `make` uses it, or the one on the path.
     beside = Path(sys.executable).with_name("snakemake")
     path = str(beside) if beside.exists() else shutil.which("snakemake")
-    yield Finding("ok", f"Snakemake: {path}") if path else Finding("missing", "the program snakemake", RENEW)
+    yield (
+        MachineFinding("ok", f"Snakemake: {path}")
+        if path
+        else MachineFinding("missing", "the program snakemake", RENEW)
+    )
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path:
-        yield Finding("ok", f"Chromium: {path}")
+        yield MachineFinding("ok", f"Chromium: {path}")
     else:
-        yield Finding("optional", "Chromium, which only the browser tests use", "apt install chromium")
+        yield MachineFinding("optional", "Chromium, which only the browser tests use", "apt install chromium")
 
 
-def _folders() -> Iterator[Finding]:
+def _folders() -> Iterator[MachineFinding]:
     for name in FOLDERS:
         if not Path(name).is_dir():
-            yield Finding("missing", f"folder {name}", "run vgyro doctor in the project's folder")
+            yield MachineFinding("missing", f"folder {name}", "run vgyro doctor in the project's folder")
         elif not os.access(name, os.W_OK):
-            yield Finding("missing", f"the right to write into {name}", f"chmod u+w {name}")
+            yield MachineFinding("missing", f"the right to write into {name}", f"chmod u+w {name}")
         else:
-            yield Finding("ok", f"folder {name} can be written")
+            yield MachineFinding("ok", f"folder {name} can be written")
 
 
-def _disk() -> Iterator[Finding]:
+def _disk() -> Iterator[MachineFinding]:
     free = shutil.disk_usage(".").free
     text = f"{free / GIB:.1f} GiB free"
     if free < ENOUGH_DISK:
-        yield Finding(
+        yield MachineFinding(
             "missing", f"disk space: {text}, {ENOUGH_DISK / GIB:.0f} GiB wanted", "make room, or move results/"
         )
     else:
-        yield Finding("ok", f"disk: {text}")
+        yield MachineFinding("ok", f"disk: {text}")
 
 
 def _needed() -> list[str]:

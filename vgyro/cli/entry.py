@@ -51,7 +51,7 @@ from dumps to a report, step by step:
 """
 
 
-class Parser(argparse.ArgumentParser):
+class CommandParser(argparse.ArgumentParser):
     """argparse, with mistakes as UsageError."""
 
     def error(self, message: str) -> NoReturn:
@@ -92,7 +92,7 @@ def _run(given: list[str]) -> int:
 
         raise UsageError(f"there is no command {name!r}{did_you_mean(name, COMMANDS)}", None, "Try vgyro --help")
     module = importlib.import_module(f"vgyro.cli.{name.replace('-', '_')}")
-    parser = Parser(
+    parser = CommandParser(
         prog=f"vgyro {name}",
         description=module.__doc__,
         epilog=module.EPILOG,
@@ -104,7 +104,7 @@ def _run(given: list[str]) -> int:
     return module.run(options)
 
 
-def _parse(parser: Parser, rest: list[str]) -> argparse.Namespace:
+def _parse(parser: CommandParser, rest: list[str]) -> argparse.Namespace:
     options, unknown = parser.parse_known_args(rest)
     if unknown:
         from vgyro.complaints import did_you_mean

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vgyro.cli.drafts.found import Found
+    from vgyro.cli.drafts.found import FoundFiles
 
 EPILOG = """\
 examples:
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def write(options: argparse.Namespace) -> tuple[Path, Found]:
+def write(options: argparse.Namespace) -> tuple[Path, FoundFiles]:
     """Look at the files and write the manifest.  returns : its path, and what was found"""
     from vgyro.cli.drafts.found import find
     from vgyro.cli.drafts.manifest_text import manifest_text

@@ -63,8 +63,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _check(manifest: Path, options: argparse.Namespace) -> int:
     from vgyro.cli import check
-    from vgyro.cli.entry import Parser
+    from vgyro.cli.entry import CommandParser
 
-    parser = Parser(prog="vgyro check")
+    parser = CommandParser(prog="vgyro check")
     check.add_arguments(parser)
     return check.run(parser.parse_args([str(manifest), "--raw", str(options.raw), "--boards", str(options.boards)]))

@@ -27,7 +27,7 @@ class Candidates(NamedTuple):
     failed: np.ndarray
 
 
-class Column(NamedTuple):
+class FrameColumn(NamedTuple):
     """A channel of a frame: its type, the byte where it begins, and its byte order."""
 
     kind: FieldType

@@ -47,7 +47,7 @@ def correlation_matrix(
     from scipy.special import ndtri
 
     del rate_hz
-    noise = _Noise(series, segment, truth)
+    noise = _PairNoise(series, segment, truth)
     covariance, functions, samples = _second_moments(noise)
     scale = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -67,7 +67,7 @@ def correlation_matrix(
 
 
 @dataclass(frozen=True)
-class _Noise:
+class _PairNoise:
     """What of N series [T] is noise: without the truth [T] and the mean of each stretch. Made when it is asked for."""
 
     series: Sequence[np.ndarray]
@@ -85,7 +85,7 @@ class _Noise:
         return column
 
 
-def _second_moments(noise: _Noise) -> tuple[np.ndarray, list[np.ndarray], int]:
+def _second_moments(noise: _PairNoise) -> tuple[np.ndarray, list[np.ndarray], int]:
     """Σ g_i g_j [N, N], the autocorrelation of each at the first lags, and the number of samples."""
     number, samples = len(noise.series), 0
     covariance = np.zeros((number, number))
@@ -105,7 +105,7 @@ def _second_moments(noise: _Noise) -> tuple[np.ndarray, list[np.ndarray], int]:
     return covariance, functions, samples
 
 
-def _effective_samples(noise: _Noise, functions: list[np.ndarray], samples: int) -> np.ndarray:
+def _effective_samples(noise: _PairNoise, functions: list[np.ndarray], samples: int) -> np.ndarray:
     """T / (1 + 2 Σ ρ_i(k) ρ_j(k)) [N, N], by as many lags as every sum needs to end, at most T/4."""
     number = len(functions)
     effective = np.full((number, number), float(samples))

@@ -6,20 +6,20 @@ Jiang et al. (2012), Sensors 12, 1720-1737, and Liu et al. (2015), Micromachines
 from __future__ import annotations
 
 from vgyro.papers.claims import Claim, Verdict, judge
-from vgyro.papers.compare import Cell, Comparison, compare, csv_of
-from vgyro.papers.evidence import Evidence, Ours, look_up, with_single
+from vgyro.papers.compare import ComparedCell, Comparison, compare, csv_of
+from vgyro.papers.evidence import Ours, PaperEvidence, look_up, with_single
 from vgyro.papers.implied import Implied
 from vgyro.papers.published import PAPERS, Paper, PublishedTable, load_paper
 
 __all__ = [
     "PAPERS",
-    "Cell",
     "Claim",
+    "ComparedCell",
     "Comparison",
-    "Evidence",
     "Implied",
     "Ours",
     "Paper",
+    "PaperEvidence",
     "PublishedTable",
     "Verdict",
     "compare",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from vgyro.papers.claims import ratio
-from vgyro.papers.evidence import Evidence, Ours, look_up
+from vgyro.papers.evidence import Ours, PaperEvidence, look_up
 from vgyro.papers.published import Case, Heading, OwnFigure, PublishedTable, Selection
 
 Standing = Literal["better", "undecided", "worse", "met", "missed", "none"]
@@ -16,7 +16,7 @@ CASE_RATE = "true_rate"
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedMethod:
     """One figure of one method.
 
     case     : in words;  own : the method is vgyro's, not the paper's
@@ -37,7 +37,7 @@ class Compared:
     standing: Standing
 
 
-def set_beside(table: PublishedTable, evidence: Evidence) -> tuple[Compared, ...]:
+def set_beside(table: PublishedTable, evidence: PaperEvidence) -> tuple[ComparedMethod, ...]:
     """Every figure of ours and of the paper's methods that the table asks for, case by case; () if it asks for none.
 
     A case of which no artefact was made is left out.
@@ -50,11 +50,11 @@ def set_beside(table: PublishedTable, evidence: Evidence) -> tuple[Compared, ...
     )
 
 
-def _made(table: PublishedTable, case: Case, evidence: Evidence) -> bool:
+def _made(table: PublishedTable, case: Case, evidence: PaperEvidence) -> bool:
     return not case.suffix or bool(evidence.rows.get(f"{table.select['artefact']}{case.suffix}"))
 
 
-def _of_case(table: PublishedTable, case: Case, evidence: Evidence) -> Iterator[Compared]:
+def _of_case(table: PublishedTable, case: Case, evidence: PaperEvidence) -> Iterator[ComparedMethod]:
     assert table.beside is not None
     rivals, name = table.rivals(), _case_name(table, case, evidence)
     for methods, own in ((table.beside.methods, True), (rivals, False)):
@@ -65,13 +65,13 @@ def _of_case(table: PublishedTable, case: Case, evidence: Evidence) -> Iterator[
                 if own and figure.target is None:
                     over, quotient = _over_best(table, case, method, figure, rivals, evidence)
                 standing = _near(value, figure) if figure.target is not None else _below_one(quotient)
-                yield Compared(
+                yield ComparedMethod(
                     name, method.name, figure.name, table.unit_of(figure, figure), own, value, over.name, quotient,
                     standing if own else "none",
                 )  # fmt: skip
 
 
-def _case_name(table: PublishedTable, case: Case, evidence: Evidence) -> str:
+def _case_name(table: PublishedTable, case: Case, evidence: PaperEvidence) -> str:
     rows = evidence.rows.get(f"{table.select['artefact']}{case.suffix}", ())
     rate = max((float(row.get(CASE_RATE, 0.0)) for row in rows), default=0.0)
     return case.name.format(rate=f"{rate:g}")
@@ -82,12 +82,17 @@ def _select(table: PublishedTable, case: Case, method: Heading, figure: OwnFigur
     return {**select, "artefact": f"{select['artefact']}{case.suffix}"}
 
 
-def _figure(table: PublishedTable, case: Case, method: Heading, figure: OwnFigure, evidence: Evidence) -> Ours:
+def _figure(table: PublishedTable, case: Case, method: Heading, figure: OwnFigure, evidence: PaperEvidence) -> Ours:
     return look_up(evidence, _select(table, case, method, figure))
 
 
 def _over_best(
-    table: PublishedTable, case: Case, method: Heading, figure: OwnFigure, rivals: Sequence[Heading], evidence: Evidence
+    table: PublishedTable,
+    case: Case,
+    method: Heading,
+    figure: OwnFigure,
+    rivals: Sequence[Heading],
+    evidence: PaperEvidence,
 ) -> tuple[Heading, Ours]:
     """The rival with the least of a figure, and the ratio of ours to it."""
     found = [(_figure(table, case, rival, figure, evidence), rival) for rival in rivals]

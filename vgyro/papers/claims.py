@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from vgyro.papers.evidence import Evidence, Ours, look_up
+from vgyro.papers.evidence import Ours, PaperEvidence, look_up
 from vgyro.validation import StrictModel
 
 Outcome = Literal["holds", "does not hold", "cannot be decided"]
@@ -112,14 +112,14 @@ class Verdict:
     reason: str
 
 
-def judge(claim: Claim, evidence: Evidence, implied: Mapping[str, float]) -> Verdict:
+def judge(claim: Claim, evidence: PaperEvidence, implied: Mapping[str, float]) -> Verdict:
     """Decide one claim.  implied : name → figure that follows from the equations (vgyro.papers.implied.FIGURES)"""
     verdict = _judge_rule(claim.rule, evidence, implied)
     comment = claim.comment.get(verdict.outcome, "")
     return Verdict(verdict.outcome, f"{verdict.reason}; {comment}" if comment else verdict.reason)
 
 
-def _judge_rule(rule: Any, evidence: Evidence, implied: Mapping[str, float]) -> Verdict:
+def _judge_rule(rule: Any, evidence: PaperEvidence, implied: Mapping[str, float]) -> Verdict:
     if isinstance(rule, BuiltInRule):
         return Verdict(OPEN, rule.because)
     if isinstance(rule, AllRule):

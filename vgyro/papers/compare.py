@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from vgyro.papers.beside import Compared
-from vgyro.papers.evidence import Evidence, Ours, look_up
+from vgyro.papers.beside import ComparedMethod
+from vgyro.papers.evidence import Ours, PaperEvidence, look_up
 from vgyro.papers.implied import Implied
 from vgyro.papers.published import Heading, Paper, PublishedTable, Variant, half_unit
 
@@ -24,7 +24,7 @@ CSV_COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Cell:
+class ComparedCell:
     """One reading of one cell.
 
     published : as printed; None in a row or column of ours
@@ -52,15 +52,15 @@ class Comparison:
 
     paper: str
     table: PublishedTable
-    cells: tuple[Cell, ...]
+    cells: tuple[ComparedCell, ...]
 
-    def at(self, row: str, column: str) -> tuple[Cell, ...]:
+    def at(self, row: str, column: str) -> tuple[ComparedCell, ...]:
         """The readings of one cell, the first one first."""
         return tuple(cell for cell in self.cells if (cell.row, cell.column) == (row, column))
 
 
 def compare(
-    paper: Paper, table: PublishedTable, evidence: Evidence, implied: Mapping[tuple[int | str, str, str], Implied]
+    paper: Paper, table: PublishedTable, evidence: PaperEvidence, implied: Mapping[tuple[int | str, str, str], Implied]
 ) -> Comparison:
     """Put every numeric cell of a table beside ours.
 
@@ -71,8 +71,8 @@ def compare(
 
 
 def _cells(
-    table: PublishedTable, evidence: Evidence, implied: Mapping[tuple[int | str, str, str], Implied]
-) -> Iterator[Cell]:
+    table: PublishedTable, evidence: PaperEvidence, implied: Mapping[tuple[int | str, str, str], Implied]
+) -> Iterator[ComparedCell]:
     for row in (*table.rows, *table.extra_rows):
         for column in (*table.columns, *table.extra_columns):
             ours_alone = row in table.extra_rows or column in table.extra_columns
@@ -85,7 +85,7 @@ def _cells(
                     ours = look_up(evidence, {**table.select, **row.select, **column.select, **variant.select})
                     unit = table.unit_of(row, column)
                     ours = _in_unit(ours, unit)
-                    yield Cell(
+                    yield ComparedCell(
                         table.number, row.name, column.name, unit, published, follows, variant.name, ours,
                         agreement(published if variant.compared else None, ours), "" if ours.known else ours.reason,
                     )  # fmt: skip
@@ -114,7 +114,7 @@ def agreement(published: str | None, ours: Ours) -> Agreement:
     return "within 10 %" if abs(ours.value - value) <= NEAR * abs(value) else "differs"
 
 
-def csv_of(comparisons: Sequence[Comparison], beside: Sequence[Compared] = ()) -> str:
+def csv_of(comparisons: Sequence[Comparison], beside: Sequence[ComparedMethod] = ()) -> str:
     """The cells as CSV, one line a reading; an empty field where there is no number.
 
     beside : methods of ours beside the paper's, of the last table, which go behind the cells
@@ -130,7 +130,7 @@ def csv_of(comparisons: Sequence[Comparison], beside: Sequence[Compared] = ()) -
     return text.getvalue()
 
 
-def _line(paper: str, cell: Cell) -> list[Any]:
+def _line(paper: str, cell: ComparedCell) -> list[Any]:
     follows = cell.implied or Implied(None, "")
     return [
         paper, cell.table, cell.row, cell.column, cell.unit, cell.published or "",
@@ -140,7 +140,7 @@ def _line(paper: str, cell: Cell) -> list[Any]:
     ]  # fmt: skip
 
 
-def _beside_line(comparison: Comparison, one: Compared) -> list[Any]:
+def _beside_line(comparison: Comparison, one: ComparedMethod) -> list[Any]:
     variant = "; ".join(filter(None, (OWN if one.own else OF_PAPER, one.case)))
     return [
         comparison.paper, comparison.table.number, one.method, one.figure, one.unit, "", "", "", variant,

@@ -14,7 +14,7 @@ _READING = ("artefact", "value", "low", "high", "unit")
 
 
 @dataclass(frozen=True)
-class Evidence:
+class PaperEvidence:
     """rows : artefact → its rows, each a mapping of column to value;  gyros : names in the order of the array"""
 
     rows: Mapping[str, Sequence[Row]]
@@ -44,7 +44,7 @@ class Ours:
         return not math.isnan(self.value)
 
 
-def look_up(evidence: Evidence, select: Mapping[str, Any]) -> Ours:
+def look_up(evidence: PaperEvidence, select: Mapping[str, Any]) -> Ours:
     """Find the figure that a selection names.
 
     select : `artefact`; `value`, `low`, `high` = columns to read (default those names); `unit` where the artefact

@@ -7,7 +7,7 @@ from typing import Any
 from markupsafe import Markup
 
 from vgyro.report.calibration.section import calibration_part, nominal
-from vgyro.report.conclusions.best import BEST_RULES, Best, best_of_all
+from vgyro.report.conclusions.best import BEST_RULES, BestMethod, best_of_all
 from vgyro.report.conclusions.conventions import conventions_part, provenance_part
 from vgyro.report.conclusions.crosscheck import crosscheck_part
 from vgyro.report.conclusions.section import BAD_RULE, bad_gyros, conclude, main_arrays
@@ -130,12 +130,12 @@ def _scale(dataset: DatasetPart) -> str:
     return "nominal" if len(unmeasured) == len(dataset.board.gyros) else "partly nominal"
 
 
-def _best_of_all(dataset: DatasetPart) -> Best | None:
+def _best_of_all(dataset: DatasetPart) -> BestMethod | None:
     found = [best for array in main_arrays(dataset) if (best := best_of_all(array)) is not None]
     return max(found, key=lambda best: best.factor.value, default=None)
 
 
-def _record(best: Best) -> dict[str, Any]:
+def _record(best: BestMethod) -> dict[str, Any]:
     limits = {name: _finite(getattr(best.factor, name)) for name in ("value", "low", "high")}
     return {"label": best.label, "axis": best.axis, "recording": best.recording, "figure": best.figure, **limits}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from vgyro.figure import Figure
 from vgyro.report.model import Value
 from vgyro.report.numbers import MISSING, significant
-from vgyro.report.tables import Cell, Column, Notes, number_cell
+from vgyro.report.tables import Cell, Notes, TableColumn, number_cell
 
 BAND_LIMITED = "band-limited"
 TAKES_PART = "the low-pass takes part"
@@ -35,9 +35,9 @@ def remarks(note: str) -> str:
     return "; ".join(part for part in clauses if not (part.startswith(ROUTINE) or part.endswith(ROUTINE_END)))
 
 
-def figure_column(figure: Figure, group: str = "") -> Column:
+def figure_column(figure: Figure, group: str = "") -> TableColumn:
     """Head of a column of one figure."""
-    return Column(figure.title, "" if figure.unit == "1" else figure.unit, hint=figure.meaning, group=group)
+    return TableColumn(figure.title, "" if figure.unit == "1" else figure.unit, hint=figure.meaning, group=group)
 
 
 def says_limited(value: Value) -> bool:

@@ -10,19 +10,19 @@ from vgyro.report.html import badge, join, link, paragraph
 from vgyro.report.model import Record
 from vgyro.report.numbers import MISSING, duration, significant
 from vgyro.report.page import Section, render_page
-from vgyro.report.tables import Cell, Column, Tone, render_table
+from vgyro.report.tables import Cell, TableColumn, Tone, render_table
 
 COLUMNS = (
-    Column("data set", numeric=False),
-    Column("board", numeric=False),
-    Column("gyros"),
-    Column("recordings"),
-    Column("length"),
-    Column("bad gyros", numeric=False, hint="more than twice the median of their array"),
-    Column("best method by 1σ, at equal bandwidth", numeric=False),
-    Column("improvement factor"),
-    Column("scale", numeric=False),
-    Column("status", numeric=False),
+    TableColumn("data set", numeric=False),
+    TableColumn("board", numeric=False),
+    TableColumn("gyros"),
+    TableColumn("recordings"),
+    TableColumn("length"),
+    TableColumn("bad gyros", numeric=False, hint="more than twice the median of their array"),
+    TableColumn("best method by 1σ, at equal bandwidth", numeric=False),
+    TableColumn("improvement factor"),
+    TableColumn("scale", numeric=False),
+    TableColumn("status", numeric=False),
 )
 TONES: dict[str, Tone] = {"good": "good", "suspect": "warn", "refused": "bad"}
 MOST_NAMED = 4

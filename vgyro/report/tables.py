@@ -15,7 +15,7 @@ Tone = Literal["", "good", "bad", "warn", "muted", "best"]
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """One column. unit : printed under the title; numeric : right-aligned, figures of one width; hint : tooltip
 
     wide : holds sentences; a narrow page scrolls rather than break them into words
@@ -48,7 +48,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """One row. heading : spans the table as a title of the rows below it (cells then stay empty)"""
 
     cells: tuple[Cell, ...] = ()
@@ -81,8 +81,8 @@ def number_cell(
 
 
 def render_table(
-    columns: Sequence[Column],
-    rows: Sequence[Row | Sequence[Cell | str]],
+    columns: Sequence[TableColumn],
+    rows: Sequence[TableRow | Sequence[Cell | str]],
     caption: str = "",
     notes: Sequence[str] = (),
     *,
@@ -100,16 +100,16 @@ def render_table(
     )  # fmt: skip
 
 
-def _row(row: Row | Sequence[Cell | str], width: int) -> Row:
-    if not isinstance(row, Row):
-        row = Row(tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row))
+def _row(row: TableRow | Sequence[Cell | str], width: int) -> TableRow:
+    if not isinstance(row, TableRow):
+        row = TableRow(tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row))
     filled = sum(cell.span for cell in row.cells)
     if not row.heading and filled != width:
         raise ValueError(f"a row has {filled} cells, the table has {width} columns: {row.cells[:1]}")
     return row
 
 
-def _groups(columns: Sequence[Column]) -> tuple[tuple[str, int], ...]:
+def _groups(columns: Sequence[TableColumn]) -> tuple[tuple[str, int], ...]:
     """Neighbouring columns of one group: (title, how many); () where no column has a group."""
     groups: list[tuple[str, int]] = []
     for column in columns:

@@ -7,11 +7,11 @@ from vgyro.simulate.manifest import dump_name, manifest_of, manifest_yaml, refer
 from vgyro.simulate.recording import Simulated, simulate_pieces, simulate_recording
 from vgyro.simulate.serial.dump import Dump, dump_of
 from vgyro.simulate.serial.encode import encode_frames
-from vgyro.simulate.serial.line import Damage, damage
+from vgyro.simulate.serial.line import DamageDone, damage
 from vgyro.simulate.twin import GyroTruth, Twin, lasting, parse_twin, truth_of
 
 __all__ = [
-    "Damage",
+    "DamageDone",
     "Dump",
     "GyroTruth",
     "Simulated",

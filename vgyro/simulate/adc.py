@@ -11,7 +11,7 @@ from vgyro.simulate.faults import Stretch
 from vgyro.simulate.serial.encode import type_limits
 
 
-class Converter:
+class AdcConverter:
     """Counts of a recording, piece after piece.
 
     count = bias + sign · (1 + scale error) · rate / scale, rounded to the nearest, held at the rails.

@@ -12,7 +12,7 @@ import numpy as np
 from vgyro.board import Board
 from vgyro.dataset import Plateau
 from vgyro.errors import DataError
-from vgyro.simulate.adc import Converter
+from vgyro.simulate.adc import AdcConverter
 from vgyro.simulate.faults import Faults, Stretch, faults_of, stretches_of
 from vgyro.simulate.motion import ReferenceRate, plateaus_of
 from vgyro.simulate.noise import (
@@ -160,7 +160,7 @@ class _Maker:
         self._truths = truths
         self._thermal, self._thermometer = temperature_of(twin, self._spec), streams.of(THERMOMETER)
         self._output = _Output(twin, board, self._spec, self._rate_hz, truths)
-        self._converter = Converter(board, [truth.scale_error for truth in truths], self._stretches)
+        self._converter = AdcConverter(board, [truth.scale_error for truth in truths], self._stretches)
 
     def end_of_piece(self, first: int) -> int:
         """Pieces are whole seconds."""

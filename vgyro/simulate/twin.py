@@ -19,7 +19,7 @@ SIZED: tuple[FaultKind, ...] = ("drift", "step", "burst", "noise", "scale")
 Correlation = Annotated[float, Field(gt=-1, lt=1)] | tuple[tuple[float, ...], ...]
 
 
-class Garch(StrictModel):
+class TwinGarch(StrictModel):
     """Volatility of the white noise, second by second: h_t = omega + alpha · r²_{t-1} + beta · h_{t-1}."""
 
     alpha: float = Field(ge=0, lt=1)
@@ -27,7 +27,7 @@ class Garch(StrictModel):
     omega: float | None = Field(None, gt=0, description="(deg/s)²; null: from arw_deg_rt_h, N²·(1 - alpha - beta)")
 
     @model_validator(mode="after")
-    def _stationary(self) -> Garch:
+    def _stationary(self) -> TwinGarch:
         if self.alpha + self.beta >= 1:
             raise ValueError(f"alpha + beta = {self.alpha + self.beta:g} must be below 1: the variance has no mean")
         return self
@@ -62,7 +62,7 @@ class GyroTruth(StrictModel):
     asymmetry_ppm: float = Field(0.0, description="(S⁺ - S⁻) over mean sensitivity, ppm")
     hysteresis_ppm: float = Field(0.0, description="width of the loop at zero rate, ppm of full scale")
     cross_axis: float = Field(0.0, gt=-0.5, lt=0.5, description="share seen of a rate about another axis")
-    garch: Garch | None = None
+    garch: TwinGarch | None = None
 
     @property
     def arw(self) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from vgyro.board import TYPE_BYTES, BinaryFrame, Board, TextFrame
-from vgyro.engine.frames import DTYPES, Column
+from vgyro.engine.frames import DTYPES, FrameColumn
 
 
 def channel_types(frame: BinaryFrame | TextFrame) -> dict[str, np.dtype]:
@@ -21,7 +21,7 @@ def kept_channels(board: Board) -> list[str]:
     return [name for name in board.channels if name != counter]
 
 
-def columns_of(frame: BinaryFrame, names: Iterable[str]) -> list[Column]:
+def columns_of(frame: BinaryFrame, names: Iterable[str]) -> list[FrameColumn]:
     """Where the named channels stand in a frame."""
     columns = {}
     for field in frame.fields:
@@ -29,5 +29,5 @@ def columns_of(frame: BinaryFrame, names: Iterable[str]) -> list[Column]:
             raise ValueError(f"field {field.name!r} of a binary frame has no offset")
         stride = field.stride or TYPE_BYTES[field.type]
         for index, channel in enumerate(field.channels()):
-            columns[channel] = Column(field.type, field.at + index * stride, field.byte_order or frame.byte_order)
+            columns[channel] = FrameColumn(field.type, field.at + index * stride, field.byte_order or frame.byte_order)
     return [columns[name] for name in names]

@@ -26,7 +26,7 @@ NEARLY_ALL_GYROS = 0.9
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RecordingOutcome:
     """What a reader knows at the end of a recording. end_s: time of the last frame, s; None without frames.
 
     declared_rate_hz : None: only the stamps tell;  stamped : the measured rate holds, whatever is declared
@@ -49,7 +49,7 @@ class Outcome:
 
 
 def conclude(
-    outcome: Outcome,
+    outcome: RecordingOutcome,
     ledger: Ledger,
     channels: dict[str, ChannelRecord],
     options: IntegrityOptions,

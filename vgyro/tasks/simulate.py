@@ -13,7 +13,7 @@ import numpy as np
 
 from vgyro.board import Board
 from vgyro.simulate import (
-    Damage,
+    DamageDone,
     Dump,
     Twin,
     check_against_board,
@@ -117,7 +117,7 @@ def check(twin: Twin, board: Board, source: str) -> None:
 
 def write_recording(
     outputs: Outputs, twin: Twin, board: Board, recording: str, seed: int | None, provenance: Provenance
-) -> list[Damage]:
+) -> list[DamageDone]:
     """Write dump, truth (ten rows a second) and, where wanted, the true rate of every sample, as a turntable's log.
 
     The recording's part of the twin and the damage are in the metadata of the truth.  returns : what the line did

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vgyro.board import BinaryFrame, parse_board
-from vgyro.engine.frames import Column
+from vgyro.engine.frames import FrameColumn
 from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, text, weights
 from vgyro.engine.text import PAD, Field, LineForm
 
@@ -110,7 +110,7 @@ def frames_results(rng: np.random.Generator) -> list[object]:
         stream[3000:3200] = bytes.fromhex(frame.sync)[0]
         candidates = frames.Finder(frame).find(stream)
         places = np.arange(0, len(stream) - frame.length, frame.length)
-        wanted = [Column(field.type, field.at, field.byte_order or frame.byte_order) for field in frame.fields]
+        wanted = [FrameColumn(field.type, field.at, field.byte_order or frame.byte_order) for field in frame.fields]
         columns = frames.read_columns(stream, places, frame.length, wanted)
         counter = stream[places].astype(np.int64)
         found += [candidates, columns, frames.breaks(places, frame.length, counter, 1, 256)]

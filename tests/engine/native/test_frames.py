@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from vgyro.board import BinaryFrame, Board
 from vgyro.config import IntegrityOptions
-from vgyro.engine.frames import DTYPES, Column
+from vgyro.engine.frames import DTYPES, FrameColumn
 from vgyro.engine.native import frames as native
 from vgyro.engine.reference import frames as reference
 from vgyro.simulate import encode_frames
@@ -109,7 +109,7 @@ def test_sync_after_the_first_covered_byte_and_a_fixed_total() -> None:
 def test_columns_of_every_type(order) -> None:
     buffer = np.random.default_rng(1).integers(0, 256, 5000, dtype=np.uint8)
     places = np.sort(np.random.default_rng(2).integers(0, 4980, 700))
-    columns = [Column(kind, at, order) for kind in DTYPES for at in (0, 5)]
+    columns = [FrameColumn(kind, at, order) for kind in DTYPES for at in (0, 5)]
     for ours, theirs in zip(
         native.read_columns(buffer, places, 20, columns),
         reference.read_columns(buffer, places, 20, columns),

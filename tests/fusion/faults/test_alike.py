@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vgyro.fusion.faults.candidate import Candidate
+from vgyro.fusion.faults.candidate import SuspectedFault
 from vgyro.fusion.faults.levels.alike import of_the_array
 from vgyro.fusion.faults.levels.drift_variance import Slow
 
@@ -18,7 +18,7 @@ def accused(others, noise=0.0, first=0, evidence=50.0, kind="drift"):
     means = form[:, None] * sizes + noise * rng.standard_normal((BLOCKS, GYROS))
     everything, run = np.ones(BLOCKS, bool), np.zeros(BLOCKS, int)
     parts = [Slow(mean, np.full(BLOCKS, max(noise, 1e-3) ** 2), everything, run) for mean in means.T]
-    return not of_the_array(Candidate(0, kind, first, first + LENGTH, evidence, 1.0, "deg/s"), parts)
+    return not of_the_array(SuspectedFault(0, kind, first, first + LENGTH, evidence, 1.0, "deg/s"), parts)
 
 
 @pytest.mark.parametrize(("others", "found"), [(0.08, True), (0.13, False)])

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from vgyro import engine
 from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError
-from vgyro.fusion.motion.models import Line, Motion, SteadyGain, dynamics, fixed_bandwidth, random_walk_keep
+from vgyro.fusion.motion.models import Motion, SpectralLine, SteadyGain, dynamics, fixed_bandwidth, random_walk_keep
 
 MODELS = [
     ("random_walk", {"q": 3.0}),
@@ -154,7 +154,7 @@ def test_unknown_model():
 
 def test_lines_beside_a_model():
     # Expected: of independent parts the covariances of the rate add, at every lag.
-    period, lines = 0.02, (Line(5.0, 1e-3, 2.0), Line(11.0, 1e-9, 0.5))
+    period, lines = 0.02, (SpectralLine(5.0, 1e-3, 2.0), SpectralLine(11.0, 1e-9, 0.5))
     whole = Motion("markov", {"tau_s": 0.8, "sd": 2.0}, 1 / period, lines=lines).dynamics()
     parts = [dynamics("markov", {"tau_s": 0.8, "sd": 2.0}, period)]
     parts += [

@@ -14,7 +14,7 @@ from vgyro.fusion.motion import choice
 from vgyro.fusion.motion.choice import _compared
 from vgyro.fusion.motion.evidence import gather
 from vgyro.fusion.motion.models import Motion
-from vgyro.fusion.motion.search import Fit
+from vgyro.fusion.motion.search import MotionFit
 from vgyro.fusion.motion.smoother import choose_motion, smooth
 
 POLE = math.exp(-2 * math.pi * 40 / 500)
@@ -180,7 +180,7 @@ BROKEN = {"frequency_hz": 0.03995, "damping": 6.57, "second_hz": 1.603, "second_
 def test_a_model_that_breaks_down_is_left_out(monkeypatch):
     # Expected: of two fits the better one cannot be smoothed with; the other is taken.
     z = np.cumsum(white(4, 3000)) * 0.1 + white(5, 3000)
-    bad = Fit("pair", BROKEN, (), np.ones(1), -1e9, 0.0)
+    bad = MotionFit("pair", BROKEN, (), np.ones(1), -1e9, 0.0)
 
     def compared(*arguments):
         found = _compared(*arguments)

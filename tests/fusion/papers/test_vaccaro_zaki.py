@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, CannotRun, FilterParameters
-from vgyro.fusion.papers.vaccaro_zaki import DriftModel, drift_model, least_drift, vaccaro_zaki
+from vgyro.fusion.papers.vaccaro_zaki import AllanDrift, drift_model, least_drift, vaccaro_zaki
 from vgyro.fusion.rest_scales import own_scales
 from vgyro.fusion.types import AllanScales
 from vgyro.metrics import Sampling, allan_scales
@@ -110,7 +110,7 @@ def test_a_gyro_without_a_walk():
     assert fused.weights[0] == pytest.approx(0, abs=1e-9)
     assert "no random walk was found in gyro 1" in fused.note
     with pytest.raises(CannotRun, match="no random walk was found in any gyro"):
-        least_drift(DriftModel(R, np.zeros((4, 4)), 0))
+        least_drift(AllanDrift(R, np.zeros((4, 4)), 0))
 
 
 def test_a_gyro_that_the_record_does_not_know():

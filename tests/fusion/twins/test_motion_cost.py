@@ -9,7 +9,7 @@ from __future__ import annotations
 import pytest
 
 from tests.fusion.twins import harness
-from vgyro.fusion.motion.evidence import Spectrum
+from vgyro.fusion.motion.evidence import RateSpectrum
 from vgyro.fusion.ours.array_estimate import shared_motion
 
 
@@ -17,13 +17,13 @@ from vgyro.fusion.ours.array_estimate import shared_motion
     ("recording", "most"), [("calibration", 150_000), ("constant", 60_000), ("random", 490_000), ("sinusoid", 150_000)]
 )
 def test_lines_of_the_spectrum_that_are_evaluated(recording: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    evaluated, risk = [], Spectrum.risk
+    evaluated, risk = [], RateSpectrum.risk
 
     def counted(spectrum, signal):
         evaluated.append(len(spectrum.power))
         return risk(spectrum, signal)
 
     case = harness.case(harness.load("demo"), recording, 1, volatility=None, faults=False)
-    monkeypatch.setattr(Spectrum, "risk", counted)
+    monkeypatch.setattr(RateSpectrum, "risk", counted)
     shared_motion(case.array, case.parameters)
     assert 0 < sum(evaluated) <= most

@@ -16,7 +16,7 @@ from vgyro.storage import open_recording
 from vgyro.storage.frames import gather
 from vgyro.storage.logs import files
 from vgyro.storage.logs.families import open_log
-from vgyro.storage.logs.table import Rows
+from vgyro.storage.logs.table import LogRows
 
 KINDS = ("csv", "parquet", "npy")
 
@@ -253,7 +253,7 @@ class Splitting:
                 last = start + self.size >= rows.batch.num_rows
                 mine = [line for line in bad if last or line.place < place + part.num_rows + number + 1]
                 bad = bad[len(mine) :]
-                yield Rows(part, place, tuple(mine))
+                yield LogRows(part, place, tuple(mine))
                 place += part.num_rows + len(mine)
             if not rows.batch.num_rows:
                 yield rows

@@ -14,7 +14,7 @@ import numpy as np
 from vgyro.board import Board
 from vgyro.calibration import find_rest
 from vgyro.cli.drafts.found_words import array_lines, clock_lines, moving_words
-from vgyro.cli.drafts.looking import Choices, Look, are_one_array, array_of, log_of, look_at
+from vgyro.cli.drafts.looking import Choices, LogLook, are_one_array, array_of, log_of, look_at
 from vgyro.cli.drafts.manifest_text import ArrayDraft, RecordingDraft, manifest_text
 from vgyro.cli.drafts.sniffing import best_board, board_of_columns, is_dump, log_draft, measured_rate
 from vgyro.config import IntegrityOptions, RestOptions
@@ -32,7 +32,7 @@ MOVES = 0.02
 
 
 @dataclass
-class Found:
+class FoundFiles:
     """What the files are.
 
     board : name of a board file, or the gyros themselves;  used_board : the board in both cases
@@ -51,7 +51,7 @@ class Found:
         return self.board if isinstance(self.board, str) else None
 
 
-def find(options: argparse.Namespace, folder: Path, manifest: Path, names: Sequence[str]) -> Found:
+def find(options: argparse.Namespace, folder: Path, manifest: Path, names: Sequence[str]) -> FoundFiles:
     """Look at the files.  folder : that holds them all;  manifest : the folder of the manifest;  names : of recordings
 
     raises : DataError, UsageError, ConfigError
@@ -88,7 +88,7 @@ def _board(options: argparse.Namespace) -> tuple[Board | None, list[str]]:
     return board_of_columns(options.files[0], options.boards)
 
 
-def _dumps(options: argparse.Namespace, folder: Path, manifest: Path, names: Sequence[str]) -> Found:
+def _dumps(options: argparse.Namespace, folder: Path, manifest: Path, names: Sequence[str]) -> FoundFiles:
     if options.board:
         board, notes = read_board(options.board, boards=options.boards), ["given on the command line"]
     else:
@@ -101,7 +101,7 @@ def _dumps(options: argparse.Namespace, folder: Path, manifest: Path, names: Seq
         drafts.append(RecordingDraft(name, [_relative(path, folder)], rate_hz=rate, notes=told, **kind))
     runs = "1 recording" if len(drafts) == 1 else f"{len(drafts)} recordings"
     line = f"board {board.name} ({notes[0]}), {runs}"
-    return Found(_written(options.board, board, manifest), board, drafts, notes, [line])
+    return FoundFiles(_written(options.board, board, manifest), board, drafts, notes, [line])
 
 
 def _same_board(files: Sequence[Path], boards: Path) -> tuple[Board, list[str]]:
@@ -118,21 +118,21 @@ def _same_board(files: Sequence[Path], boards: Path) -> tuple[Board, list[str]]:
 
 def _logs_of_board(
     options: argparse.Namespace, folder: Path, manifest: Path, names: Sequence[str], board: Board, notes: list[str]
-) -> Found:
+) -> FoundFiles:
     drafts = []
     for path, name in zip(options.files, names, strict=True):
         draft = RecordingDraft(name, [_relative(path, folder)], rate_hz=options.rate, log=log_draft(path, board))
         drafts.append(draft)
     written = _written(options.board, board, manifest)
     lines = [f"board {board.name} ({notes[0]})"]
-    found = Found(written, board, drafts, notes, lines)
+    found = FoundFiles(written, board, drafts, notes, lines)
     for draft in drafts:
         if draft.log is not None and not draft.log.missing:
             lines += _surveyed(found, draft, folder, options.kind)
     return found
 
 
-def _logs(options: argparse.Namespace, folder: Path, names: Sequence[str]) -> Found:
+def _logs(options: argparse.Namespace, folder: Path, names: Sequence[str]) -> FoundFiles:
     looks = [look_at(_first_file(path)) for path in options.files]
     choices = Choices(options.rate, options.scale, options.unit, options.axis, options.together)
     together = options.together
@@ -154,7 +154,7 @@ def _logs(options: argparse.Namespace, folder: Path, names: Sequence[str]) -> Fo
             still = _times_that_stand(looks[0].sources[0].roles)
             what = f"has no column of time stamps{still}, so its rate is not known"
             raise UsageError(what, str(options.files[0]), "give it: --rate HZ")
-    found = Found(array, _board_of(array, drafts), drafts, [], list(array_lines(looks, array, together)))
+    found = FoundFiles(array, _board_of(array, drafts), drafts, [], list(array_lines(looks, array, together)))
     for draft in drafts:
         found.lines += _surveyed(found, draft, folder, options.kind)
     return found
@@ -172,12 +172,12 @@ def _first_file(path: Path) -> Path:
     return files_inside(path)[0] if path.is_dir() else path
 
 
-def _rows(look: Look) -> int:
+def _rows(look: LogLook) -> int:
     first = look.sources[0]
     return sum(rows.batch.num_rows for rows in look.opened.rows(first.table.name, [first.roles.gyros[0].column]))
 
 
-def _must_be_alike(looks: Sequence[Look], together: bool) -> None:
+def _must_be_alike(looks: Sequence[LogLook], together: bool) -> None:
     columns = [tuple(gyro.column for gyro in look.sources[0].roles.gyros) for look in looks]
     for look, one in zip(looks, columns, strict=True):
         if one != columns[0] and not together:
@@ -197,7 +197,7 @@ def _board_of(array: ArrayDraft, drafts: Sequence[RecordingDraft]) -> Board:
     return board
 
 
-def _surveyed(found: Found, draft: RecordingDraft, folder: Path, kind: str | None) -> list[str]:
+def _surveyed(found: FoundFiles, draft: RecordingDraft, folder: Path, kind: str | None) -> list[str]:
     """Read the recording as the pipeline will, set its kind, and say what was seen."""
     size = sum(one.stat().st_size for name in draft.files for one in _all_files(folder / name))
     if kind is not None:
@@ -232,7 +232,9 @@ def _all_files(path: Path) -> list[Path]:
     return [one for one in path.rglob("*") if one.is_file()] if path.is_dir() else [path]
 
 
-def survey(found: Found, draft: RecordingDraft, folder: Path) -> tuple[Integrity, float, list[tuple[float, float]]]:
+def survey(
+    found: FoundFiles, draft: RecordingDraft, folder: Path
+) -> tuple[Integrity, float, list[tuple[float, float]]]:
     """The integrity record, the share of the time at rest, and when the board moved, s.  raises : DataError, Refused"""
     manifest = parse_manifest(manifest_text(found.board, [], ".", [draft]), "dataset.yaml")
     recording = manifest.recordings[0]

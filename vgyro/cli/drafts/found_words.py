@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from vgyro.cli.drafts.looking import Look
+from vgyro.cli.drafts.looking import LogLook
 from vgyro.cli.drafts.manifest_text import ArrayDraft
 from vgyro.storage.integrity import Integrity
 from vgyro.storage.logs.names import bare_name
 
 
-def array_lines(looks: Sequence[Look], array: ArrayDraft, together: bool) -> list[str]:
+def array_lines(looks: Sequence[LogLook], array: ArrayDraft, together: bool) -> list[str]:
     """Files, time, gyros with their units, thermometers, and what is not used."""
     first = looks[0].sources[0]
     lines = []

@@ -35,7 +35,7 @@ class Choices(NamedTuple):
     together: bool | None = None
 
 
-class Source(NamedTuple):
+class LogSource(NamedTuple):
     """Gyros that are sampled together: one table of a file, or its rows of one id."""
 
     table: LogTable
@@ -44,16 +44,16 @@ class Source(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Look:
+class LogLook:
     """One log: what it holds. unused: tables with gyros that were not taken."""
 
     path: Path
     opened: LogFile
-    sources: tuple[Source, ...]
+    sources: tuple[LogSource, ...]
     unused: tuple[str, ...] = ()
 
 
-def look_at(path: Path) -> Look:
+def look_at(path: Path) -> LogLook:
     """Open a log and guess the role of every column.  raises : DataError if it is no log, or holds no gyro"""
     opened = open_log(path, Log())
     gyros: list[tuple[LogTable, Roles]] = []
@@ -76,9 +76,9 @@ def look_at(path: Path) -> Look:
         raise DataError(f"no column looks like a gyro's: {there or 'no columns of numbers'}", str(path), remedy)
     chosen = _alike(gyros)
     _check_values(path, opened, chosen)
-    sources = [Source(table, roles, one) for table, roles in chosen for one in (roles.ids or (None,))]
+    sources = [LogSource(table, roles, one) for table, roles in chosen for one in (roles.ids or (None,))]
     taken = {table.name for table, _ in chosen}
-    return Look(path, opened, tuple(sources), tuple(table.name for table, _ in gyros if table.name not in taken))
+    return LogLook(path, opened, tuple(sources), tuple(table.name for table, _ in gyros if table.name not in taken))
 
 
 def _check_values(path: Path, opened: LogFile, chosen: Sequence[tuple[LogTable, Roles]]) -> None:
@@ -120,7 +120,7 @@ def _alike(found: Sequence[tuple[LogTable, Roles]]) -> list[tuple[LogTable, Role
     return max(groups.values(), key=lambda group: (not NOT_RAW.search(group[0][0].name), len(group)))
 
 
-def are_one_array(looks: Sequence[Look], rows: Sequence[int]) -> bool:
+def are_one_array(looks: Sequence[LogLook], rows: Sequence[int]) -> bool:
     """Do several files hold one array, a file a gyro? One gyro an axis each, and about as many rows in each."""
     axes = [[gyro.axis for gyro in look.sources[0].roles.gyros] for look in looks]
     single = all(len(look.sources) == 1 for look in looks) and all(len(set(one)) == len(one) for one in axes)
@@ -128,7 +128,7 @@ def are_one_array(looks: Sequence[Look], rows: Sequence[int]) -> bool:
     return len(looks) > 1 and single and same and max(rows) - min(rows) <= SAME_LENGTH * max(rows)
 
 
-def array_of(looks: Sequence[Look], choices: Choices, several_files: bool) -> ArrayDraft:
+def array_of(looks: Sequence[LogLook], choices: Choices, several_files: bool) -> ArrayDraft:
     """The gyros and thermometers of a manifest, with where each stands.
 
     several_files : the looks are of one array, a file each; else the first speaks for all
@@ -173,7 +173,9 @@ def _gyro(name: str, guess: GyroGuess, choices: Choices, path: Path, placed: boo
     return entry
 
 
-def _place(look: Look, source: Source, sources: Sequence[tuple[Look, Source]], several_files: bool) -> dict[str, Any]:
+def _place(
+    look: LogLook, source: LogSource, sources: Sequence[tuple[LogLook, LogSource]], several_files: bool
+) -> dict[str, Any]:
     """What tells the columns of a source from those of the others; empty where there is one source."""
     place: dict[str, Any] = {}
     if len({one.table.name for _, one in sources}) > 1:
@@ -185,7 +187,7 @@ def _place(look: Look, source: Source, sources: Sequence[tuple[Look, Source]], s
     return place
 
 
-def _prefix(look: Look, source: Source, sources: Sequence[tuple[Look, Source]], several_files: bool) -> str:
+def _prefix(look: LogLook, source: LogSource, sources: Sequence[tuple[LogLook, LogSource]], several_files: bool) -> str:
     parts = []
     if several_files:
         parts.append(re.sub(r"\..*$", "", look.path.name))
@@ -210,7 +212,7 @@ def _unique(name: str, names: set[str]) -> str:
     return chosen
 
 
-def log_of(look: Look, array: ArrayDraft) -> LogDraft:
+def log_of(look: LogLook, array: ArrayDraft) -> LogDraft:
     """How the log is to be read."""
     first = look.sources[0]
     tables = {source.table.name for source in look.sources}

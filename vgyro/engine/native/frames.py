@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vgyro.engine.checksums import crc_tables
-from vgyro.engine.frames import DTYPES, Candidates, Column, Run, fixed_bytes
+from vgyro.engine.frames import DTYPES, Candidates, FrameColumn, Run, fixed_bytes
 from vgyro.engine.native import _frames
 
 if TYPE_CHECKING:
@@ -61,7 +61,9 @@ class Finder:
         return Candidates(_joined(good), _joined(failed))
 
 
-def read_columns(buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[Column]) -> list[np.ndarray]:
+def read_columns(
+    buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[FrameColumn]
+) -> list[np.ndarray]:
     """Values of channels of the frames of `length` bytes that begin at `places`, each [n], in the channel's own type.
 
     buffer : uint8 [m];  places : int64 [n], ascending

@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro.board import TYPE_BYTES, BinaryFrame, ByteOrder, Checksum
 from vgyro.engine.checksums import crc_tables, mask
-from vgyro.engine.frames import DTYPES, Candidates, Column, Run, fixed_bytes
+from vgyro.engine.frames import DTYPES, Candidates, FrameColumn, Run, fixed_bytes
 
 Verifier = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -38,7 +38,9 @@ class Finder:
         return places
 
 
-def read_columns(buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[Column]) -> list[np.ndarray]:
+def read_columns(
+    buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[FrameColumn]
+) -> list[np.ndarray]:
     """Values of channels of the frames of `length` bytes that begin at `places`, each [n], in the channel's own type.
 
     buffer : uint8 [m];  places : int64 [n], ascending
@@ -135,7 +137,7 @@ def stored_value(buffer: np.ndarray, places: np.ndarray, size: int, order: ByteO
     return value
 
 
-def _value(frames: np.ndarray, column: Column) -> np.ndarray:
+def _value(frames: np.ndarray, column: FrameColumn) -> np.ndarray:
     if TYPE_BYTES[column.kind] == 3:
         return _value_24(frames, column)
     stored = np.dtype({
@@ -145,7 +147,7 @@ def _value(frames: np.ndarray, column: Column) -> np.ndarray:
     return frames.reshape(-1).view(stored)["x"].astype(DTYPES[column.kind])
 
 
-def _value_24(frames: np.ndarray, column: Column) -> np.ndarray:
+def _value_24(frames: np.ndarray, column: FrameColumn) -> np.ndarray:
     at = column.at
     high, middle, low = (at, at + 1, at + 2) if column.order == "big" else (at + 2, at + 1, at)
     # The 24 bits go to the top of 32, so that the shift back down spreads the sign.

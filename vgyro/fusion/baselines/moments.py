@@ -25,7 +25,7 @@ Moments = Iterator[tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class Blocks:
+class MomentBlocks:
     """Blocks of `size` samples of the rates [T, N] in the gap-free stretches; a remainder is of the last block.
 
     first [M], first sample of each block; used [M], whether it counts; block [T], block of each sample, -1: of none
@@ -63,7 +63,7 @@ def ewma_two_sided(array: ArrayRates, parameters: FilterParameters) -> Fused:
     return _fused(array, parameters, blocks, lambda slices: _around(blocks, slices, decay))
 
 
-def _rolling(blocks: Blocks, slices: list[slice], length: int) -> Moments:
+def _rolling(blocks: MomentBlocks, slices: list[slice], length: int) -> Moments:
     # Running totals after `behind`, behind + 1, … of the blocks that count: the window reaches back over `length` of
     # those, however long ago they were.
     total, behind = np.zeros((blocks.rate.shape[1], 1)), 0
@@ -91,7 +91,7 @@ class Decay:
         keep = math.exp(-1.0 / (parameters.block_hz * parameters.ewma_time_s))
         return cls(keep, engines.get(parameters.engine).kalman.low_pass)
 
-    def sums(self, blocks: Blocks, part: slice, start: np.ndarray, back: bool = False) -> np.ndarray:
+    def sums(self, blocks: MomentBlocks, part: slice, start: np.ndarray, back: bool = False) -> np.ndarray:
         """[N + 1, B + 1]: column k is Σ keep^age·square of each gyro, and Σ keep^age in the last row, of all blocks
         before block k of the part, the nearest at age 0; with `back`, of block k and all after it.
 
@@ -105,7 +105,7 @@ class Decay:
         return sums[:, ::-1] if back else sums
 
 
-def _before(blocks: Blocks, slices: list[slice], decay: Decay) -> Moments:
+def _before(blocks: MomentBlocks, slices: list[slice], decay: Decay) -> Moments:
     past, known = np.zeros(blocks.rate.shape[1] + 1), 0
     for part in slices:
         sums = decay.sums(blocks, part, past)
@@ -114,7 +114,7 @@ def _before(blocks: Blocks, slices: list[slice], decay: Decay) -> Moments:
         past, known = sums[:, -1], known + int(blocks.used[part].sum())
 
 
-def _around(blocks: Blocks, slices: list[slice], decay: Decay) -> Moments:
+def _around(blocks: MomentBlocks, slices: list[slice], decay: Decay) -> Moments:
     past = np.zeros(blocks.rate.shape[1] + 1)
     # The sums over all blocks after each part, from the last part to the first; copies, so that nothing else is kept.
     futures = [past]
@@ -132,7 +132,7 @@ def _positive(mass: np.ndarray) -> np.ndarray:
     return np.where(mass > 0, mass, 1.0)
 
 
-def _blocks(array: ArrayRates, parameters: FilterParameters) -> Blocks:
+def _blocks(array: ArrayRates, parameters: FilterParameters) -> MomentBlocks:
     size = max(1, round(array.rate_hz / parameters.block_hz))
     standing = array.at_rest if array.at_rest.any() else np.ones(len(array.rate), dtype=bool)
     block, number = np.full(len(array.rate), -1, dtype=np.int32), 0
@@ -147,7 +147,7 @@ def _blocks(array: ArrayRates, parameters: FilterParameters) -> Blocks:
         block[whole] = np.repeat(np.arange(number, number + count, dtype=np.int32), size)
         number += count
         block[whole.stop : part.stop] = number - 1
-    blocks = Blocks(array.rate, size, np.concatenate(first), np.concatenate(used), block)
+    blocks = MomentBlocks(array.rate, size, np.concatenate(first), np.concatenate(used), block)
     if blocks.used.sum() < FEWEST_BLOCKS:
         raise CannotRun(
             f"fewer than {FEWEST_BLOCKS} blocks of {1.0 / parameters.block_hz:g} s",
@@ -157,7 +157,7 @@ def _blocks(array: ArrayRates, parameters: FilterParameters) -> Blocks:
 
 
 def _fused(
-    array: ArrayRates, parameters: FilterParameters, blocks: Blocks, moments: Callable[[list[slice]], Moments]
+    array: ArrayRates, parameters: FilterParameters, blocks: MomentBlocks, moments: Callable[[list[slice]], Moments]
 ) -> Fused:
     """Fuse with weights ∝ 1/moment of each block; equal weights where fewer than FEWEST_BLOCKS blocks are known."""
 

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from vgyro.fusion.bias.blocks import SlowBlocks
-from vgyro.fusion.bias.model import Evidence, Walk, log_likelihood, log_likelihood_slope
+from vgyro.fusion.bias.model import BiasEvidence, Walk, log_likelihood, log_likelihood_slope
 from vgyro.fusion.bias.prior import empirical_prior
 from vgyro.fusion.bias.smoother import Filtered, Information
 
@@ -52,7 +52,7 @@ class Choice:
     needed: float
 
 
-def choose(evidence: Evidence, blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndarray, known: Walk | None) -> Choice:
+def choose(evidence: BiasEvidence, blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndarray, known: Walk | None) -> Choice:
     """The random walks with and without temperature slopes, and which of the two models the data support.
 
     rrw : K [N], deg/s/√s, as measured, NaN if unknown;  arw : [N], deg/s/√Hz, of the white noise, about
@@ -84,7 +84,12 @@ def choose(evidence: Evidence, blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndar
 
 
 def quick_gains(
-    plain: Evidence, walk: Walk, others: Sequence[Evidence], blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndarray
+    plain: BiasEvidence,
+    walk: Walk,
+    others: Sequence[BiasEvidence],
+    blocks: SlowBlocks,
+    rrw: np.ndarray,
+    arw: np.ndarray,
 ) -> list[float]:
     """2Δ log likelihood of each of `others`, which have slopes, over `plain` with `walk`, before walks are chosen.
 
@@ -108,7 +113,7 @@ class _Search:
     broad [N + E] : prior of the biases and steps
     """
 
-    evidence: Evidence
+    evidence: BiasEvidence
     information: Information
     given: np.ndarray
     bounds: tuple[float, float]
@@ -116,7 +121,7 @@ class _Search:
     broad: np.ndarray
 
     @classmethod
-    def of(cls, evidence: Evidence, blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndarray) -> _Search:
+    def of(cls, evidence: BiasEvidence, blocks: SlowBlocks, rrw: np.ndarray, arw: np.ndarray) -> _Search:
         given = np.where(np.isfinite(rrw), rrw, 0.0)
         block_s = float(np.median(np.diff(blocks.time))) if len(blocks) > 1 else 1.0
         duration = max(float(blocks.time[-1] - blocks.time[0]), block_s)

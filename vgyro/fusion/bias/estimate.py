@@ -15,7 +15,7 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.common_walk import common_note
-from vgyro.fusion.bias.followed import Case, Followed
+from vgyro.fusion.bias.followed import BiasCase, Followed
 from vgyro.fusion.bias.model import Constants, Walk, root_of, with_shared_slope
 from vgyro.fusion.bias.prior import empirical_prior
 from vgyro.fusion.bias.smoother import run_smoother
@@ -29,7 +29,7 @@ Weights = np.ndarray | SampleWeights
 
 
 @dataclass(frozen=True)
-class Temperature:
+class TemperatureCoefficients:
     """Temperature coefficients of the biases.
 
     slope [N], deg/s/K, covariance [N, N]: what all gyros share is known from standstill alone
@@ -56,7 +56,7 @@ class SlowErrors:
     bias: np.ndarray
     covariance: np.ndarray
     anchored: bool
-    temperature: Temperature | None
+    temperature: TemperatureCoefficients | None
     walk: Walk
     constants: Constants
     note: str
@@ -102,7 +102,7 @@ def slow_errors(
     if walk is None and not parameters.has("slow_walk"):
         walk = Walk(np.nan_to_num(array.noise.rrw))
     arw = usual_arw(variance, array.period)
-    found = Case(array, parameters, blocks, variance, noise, resting, arw, walk).followed()
+    found = BiasCase(array, parameters, blocks, variance, noise, resting, arw, walk).followed()
     evidence, choice = found.evidence, found.choice
     constants = empirical_prior(evidence, choice.filtered).posterior(choice.filtered)
     state, covariance = run_smoother(choice.information, choice.filtered)
@@ -178,13 +178,13 @@ def _of_walk(array: ArrayRates, walk: Walk) -> str:
     return f"K = {sizes} deg/h/√h{fading}, by likelihood (2Δ log L = {walk.gain:.1f})"
 
 
-def _slopes(found: Followed, constants: Constants) -> Temperature:
+def _slopes(found: Followed, constants: Constants) -> TemperatureCoefficients:
     slopes = slice(found.evidence.plain, None)
     mean, covariance = constants.mean[slopes], constants.covariance[slopes, slopes]
     if found.known is None:
-        return Temperature(mean, covariance, found.reference)
+        return TemperatureCoefficients(mean, covariance, found.reference)
     root = root_of(found.known.covariance)
-    return Temperature(found.known.slope + root @ mean, root @ covariance @ root, found.reference)
+    return TemperatureCoefficients(found.known.slope + root @ mean, root @ covariance @ root, found.reference)
 
 
 def _of_followed(found: Followed, constant_rate: bool) -> str:

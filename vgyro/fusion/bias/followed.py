@@ -13,7 +13,7 @@ import numpy as np
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.choice import Choice, choose, quick_gains
 from vgyro.fusion.bias.common_walk import common_walk
-from vgyro.fusion.bias.model import Evidence, Walk
+from vgyro.fusion.bias.model import BiasEvidence, Walk
 from vgyro.fusion.types import ArrayRates, FilterParameters, TemperatureAtRest
 
 CONTRADICTED = "the differences contradict the temperature coefficients of the record at rest: these are not used"
@@ -39,7 +39,7 @@ class Followed:
     note      : what was not looked for, or not believed
     """
 
-    evidence: Evidence
+    evidence: BiasEvidence
     choice: Choice
     common: float
     regressor: np.ndarray | None = None
@@ -50,7 +50,7 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class Case:
+class BiasCase:
     """One recording.
 
     variance : [B, N] of a sample;  correlation : [N, N] of the noise;  resting : [B], blocks at rest for certain
@@ -98,8 +98,8 @@ class Case:
         choice = choose(evidence, self.blocks, noise.rrw, self.arw, self.walk)
         return Followed(evidence, choice, common, regressor, reference, known, settles_s, note)
 
-    def _evidence(self, regressor: np.ndarray | None, common: float, known: TemperatureAtRest | None) -> Evidence:
-        return Evidence.of(
+    def _evidence(self, regressor: np.ndarray | None, common: float, known: TemperatureAtRest | None) -> BiasEvidence:
+        return BiasEvidence.of(
             self.array, self.blocks, self.variance, self.correlation, self.resting, regressor, common, known
         )
 

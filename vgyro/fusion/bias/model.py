@@ -47,7 +47,7 @@ class Walk:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class BiasEvidence:
     """Block means of N gyros and what they weigh.
 
     means  : [B, N], deg/s, less `shared` [B], their mean where the board may move
@@ -83,7 +83,7 @@ class Evidence:
         temperature: np.ndarray | None,
         common: float = 0.0,
         slopes: TemperatureAtRest | None = None,
-    ) -> Evidence:
+    ) -> BiasEvidence:
         """All blocks of a recording.
 
         variance    : [B, N], (deg/s)² of a sample; not finite or not above 0: the gyro says nothing in this block
@@ -145,7 +145,7 @@ class Evidence:
         starts = [0, *([self.plain] if self.has_slopes and not self.known_slopes else [])]
         return np.concatenate([1 + start + gone for start in starts])
 
-    def part(self, kept: np.ndarray) -> Evidence:
+    def part(self, kept: np.ndarray) -> BiasEvidence:
         """Some of the blocks, by their numbers, increasing: the others are as if they had not been measured."""
         chosen = {name: getattr(self, name)[kept] for name in ("means", "shared", "weight", "total", "time", "design")}
         return replace(self, **chosen)
@@ -263,7 +263,7 @@ def log_likelihood(filtered: Filtered, prior: np.ndarray) -> float:
 
 
 def log_likelihood_slope(
-    evidence: Evidence, blocks: Information, filtered: Filtered, prior: np.ndarray, rrw: np.ndarray
+    evidence: BiasEvidence, blocks: Information, filtered: Filtered, prior: np.ndarray, rrw: np.ndarray
 ) -> np.ndarray:
     """Derivatives [N] of log_likelihood by log K_i, exactly.
 
@@ -282,7 +282,7 @@ def log_likelihood_slope(
     return rrw * ((excess * evidence.walks) @ rrw)
 
 
-def with_shared_slope(evidence: Evidence, walk: Walk, bias: np.ndarray, constants: Constants) -> Constants:
+def with_shared_slope(evidence: BiasEvidence, walk: Walk, bias: np.ndarray, constants: Constants) -> Constants:
     """The constants with what a rate that is one constant throughout says of the temperature slope that all share.
 
     bias : b̂ [B, N] so far. What is left of the rate, z = u'(y - b̂) with u = R⁻¹1/(1'R⁻¹1), is regressed on a constant

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from vgyro.fusion.bias.model import Constants, Evidence
+from vgyro.fusion.bias.model import BiasEvidence, Constants
 from vgyro.fusion.bias.smoother import Filtered
 
 FAR_OFF = 0.003
@@ -57,7 +57,7 @@ class Prior:
         return Constants(self.sums @ mean, self.sums @ covariance @ self.sums.T)
 
 
-def empirical_prior(evidence: Evidence, filtered: Filtered) -> Prior:
+def empirical_prior(evidence: BiasEvidence, filtered: Filtered) -> Prior:
     """The mixture over s and over which gyros are far off, each weighed by the likelihood of the blocks.
 
     far off : a normal variable of the variance of the gyro's own square, which costs FAR_OFF

@@ -13,7 +13,7 @@ NORMAL_MEDIAN = 0.6745
 
 
 @dataclass(frozen=True)
-class Candidate:
+class SuspectedFault:
     """A gyro suspected over blocks [first, last). evidence, size, unit : as of FaultEvent"""
 
     gyro: int

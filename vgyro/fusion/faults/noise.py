@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vgyro.fusion.faults.candidate import Candidate, best_interval, lengths_up_to, running_sum, spread
+from vgyro.fusion.faults.candidate import SuspectedFault, best_interval, lengths_up_to, running_sum, spread
 from vgyro.fusion.faults.residuals import Residuals
 
 LEAST_LONG = 1.25
@@ -108,7 +108,7 @@ def least_ratio(seconds: float) -> float:
 
 def suspect_noise(
     state: NoiseLevel, gyro: int, block_s: float, burst_s: float, threshold: float
-) -> Iterator[Candidate]:
+) -> Iterator[SuspectedFault]:
     """The windows in which the noise is far above the usual, the farthest first, their ends by maximum likelihood.
 
     block_s : length of a block, s;  burst_s : a shorter event is a burst
@@ -122,7 +122,7 @@ def suspect_noise(
         evidence, first, last, mean = found
         ratio, seconds = ratio_of(mean, state.share), (last - first) * block_s
         if ratio >= least_ratio(seconds):
-            yield Candidate(gyro, "burst" if seconds < burst_s else "noise", first, last, evidence, ratio, "1")
+            yield SuspectedFault(gyro, "burst" if seconds < burst_s else "noise", first, last, evidence, ratio, "1")
         level[first:last], counts[first:last] = 0.0, False
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vgyro.fusion.faults.block_sums import BlockSums
-from vgyro.fusion.faults.candidate import Candidate, lengths_up_to, running_sum, spread, weighted_median
+from vgyro.fusion.faults.candidate import SuspectedFault, lengths_up_to, running_sum, spread, weighted_median
 from vgyro.fusion.faults.residuals import Residuals, Spoilt, residuals_of
 
 LEAST_CHANGE = 0.005
@@ -82,7 +82,7 @@ def slope_in(sums: BlockSums, found: Residuals, gyro: int, first: int, last: int
 
 def suspect_scale(
     sums: BlockSums, found: Residuals, gyro: int, counts: np.ndarray, local: np.ndarray, threshold: float
-) -> Candidate | None:
+) -> SuspectedFault | None:
     """The window in which the slope differs most from the usual; None: in none.
 
     counts : [B], false where something else is known to be wrong
@@ -121,7 +121,7 @@ def suspect_scale(
     after = int(np.flatnonzero(counts)[-1]) + 1 if last >= len(moving) - EDGE else int(moving[last])
     begin = max(before, begin - AROUND)
     end = after if last >= len(moving) - EDGE else min(after, end + AROUND)
-    return Candidate(gyro, "scale", begin, end, best[0], size, "1")
+    return SuspectedFault(gyro, "scale", begin, end, best[0], size, "1")
 
 
 def _ends(sx: np.ndarray, sw: np.ndarray, first: int, last: int) -> tuple[int, int]:

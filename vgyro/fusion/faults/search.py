@@ -10,7 +10,7 @@ import numpy as np
 from vgyro.config import FaultOptions
 from vgyro.fusion.events import FaultEvent, FaultKind
 from vgyro.fusion.faults.block_sums import BlockSums, block_length, block_sums, silent_share
-from vgyro.fusion.faults.candidate import Candidate
+from vgyro.fusion.faults.candidate import SuspectedFault
 from vgyro.fusion.faults.levels.temperature import block_temperature
 from vgyro.fusion.faults.samples.found import Looked, look_at_samples
 from vgyro.fusion.faults.state import BIAS_KINDS, NOISE_KINDS, State
@@ -33,7 +33,7 @@ TOO_COARSE = f"the counts are too coarse for the noise: blocks hold one value al
 
 
 @dataclass(frozen=True)
-class Search:
+class FaultSearch:
     """events : as of find_faults;  note : what could not be looked for in this recording, and why; "": nothing"""
 
     events: list[FaultEvent]
@@ -49,7 +49,7 @@ def find_faults(
 
 def search_faults(
     array: ArrayRates, options: FaultOptions | None = None, zero: np.ndarray | None = None, in_hand: bool = False
-) -> Search:
+) -> FaultSearch:
     """Look for stretches in which a gyro is at fault.
 
     zero : [N, 2] deg/s, between which the rate of a count of zero lies (NaN: not known), to tell dropout from stuck
@@ -70,7 +70,7 @@ def search_faults(
         found, deaf, note = _search(part, gone, odd, options, in_hand)
         events += [replace(one, gyro=kept[one.gyro]) for one in (*found, *deaf)]
         if not deaf:
-            return Search(sorted(events, key=lambda event: (event.start, event.gyro, event.kind)), note)
+            return FaultSearch(sorted(events, key=lambda event: (event.start, event.gyro, event.kind)), note)
         silent = {one.gyro for one in deaf}
         kept = [gyro for place, gyro in enumerate(kept) if place not in silent]
 
@@ -115,9 +115,9 @@ def _search(
     return [_in_samples(one, sums) for one in (*found, *state.silenced)], [], note
 
 
-def _merged(found: Sequence[Candidate], burst_blocks: float) -> list[Candidate]:
+def _merged(found: Sequence[SuspectedFault], burst_blocks: float) -> list[SuspectedFault]:
     """Events of a gyro and kind that touch as one; step and drift, noise and burst are of one kind here."""
-    merged: list[Candidate] = []
+    merged: list[SuspectedFault] = []
     for kinds in (BIAS_KINDS, NOISE_KINDS, ("scale",)):
         for one in sorted((one for one in found if one.kind in kinds), key=lambda one: (one.gyro, one.first)):
             last = merged[-1] if merged else None
@@ -133,10 +133,10 @@ def _merged(found: Sequence[Candidate], burst_blocks: float) -> list[Candidate]:
     return merged
 
 
-def _noise_kind(one: Candidate, burst_blocks: float) -> FaultKind:
+def _noise_kind(one: SuspectedFault, burst_blocks: float) -> FaultKind:
     return "burst" if one.last - one.first < burst_blocks else "noise"
 
 
-def _in_samples(one: Candidate, sums: BlockSums) -> FaultEvent:
+def _in_samples(one: SuspectedFault, sums: BlockSums) -> FaultEvent:
     start, stop = int(sums.edges[one.first]), int(sums.edges[one.last])
     return FaultEvent(one.gyro, one.kind, start, stop, one.evidence, one.size, one.unit)

@@ -10,7 +10,7 @@ import numpy as np
 from vgyro.config import FaultOptions
 from vgyro.fusion.events import FAULT_KINDS
 from vgyro.fusion.faults.block_sums import BlockSums
-from vgyro.fusion.faults.candidate import Candidate
+from vgyro.fusion.faults.candidate import SuspectedFault
 from vgyro.fusion.faults.levels.alike import of_the_array
 from vgyro.fusion.faults.levels.bias import suspect_bias
 from vgyro.fusion.faults.levels.drift_variance import Slow, local_variance, slow_part
@@ -54,8 +54,8 @@ class State:
     temperature: np.ndarray | None = None
     still: np.ndarray | None = None
     step: np.ndarray | None = None
-    taken: list[Candidate] = field(default_factory=list)
-    silenced: list[Candidate] = field(default_factory=list)
+    taken: list[SuspectedFault] = field(default_factory=list)
+    silenced: list[SuspectedFault] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         gyros = self.sums.gyros
@@ -71,7 +71,7 @@ class State:
         step = np.zeros(gyros) if self.step is None else self.step
         self.rounding = rounding_of(step, self.sigma2)
 
-    def search(self) -> list[Candidate]:
+    def search(self) -> list[SuspectedFault]:
         """Faults in blocks, in the order in which they were found."""
         self._judge()
         for _ in range(MOST_ROUNDS):
@@ -88,7 +88,7 @@ class State:
         taken = [one for one in self.taken if one.kind != "scale" or abs(one.size) >= LEAST_CHANGE]
         return [one for one in self._sized(taken, found) if self._is_event(one, BIAS_KINDS + NOISE_KINDS + ("scale",))]
 
-    def _deaf(self) -> list[Candidate]:
+    def _deaf(self) -> list[SuspectedFault]:
         """Gyros without the motion in their rates, and with no more noise than is left without it.
 
         A gain as small, with more noise, is none: the others share something that is no motion, as noise from one
@@ -102,13 +102,15 @@ class State:
             if own < DEAF * energy:
                 times = self.sums.count[rows] * found.energy[rows, gyro] / self.sigma2[gyro]
                 heard.append(
-                    Candidate(gyro, "dead", 0, len(rows), float(np.sqrt(times.sum())), float(gain[gyro]) - 1.0, "1")
+                    SuspectedFault(
+                        gyro, "dead", 0, len(rows), float(np.sqrt(times.sum())), float(gain[gyro]) - 1.0, "1"
+                    )
                 )
             else:
                 self.gain[:, gyro] = 1.0
         return heard
 
-    def _silence(self, one: Candidate) -> None:
+    def _silence(self, one: SuspectedFault) -> None:
         """A gyro that stops to show the motion is no gyro from then on."""
         self.sums.alive[one.first : one.last, one.gyro] = False
         self.dead = spans_of(~self.sums.alive)
@@ -181,7 +183,7 @@ class State:
                     counts[max(0, place - 2) : place + 2] = False
         return counts
 
-    def _strongest(self, found: Residuals) -> list[Candidate]:
+    def _strongest(self, found: Residuals) -> list[SuspectedFault]:
         """The strongest suspicion of all, no weaker than the threshold.
 
         If it is one of noise, that gyro's others come with it, wherever it has more of it than any other gyro: in one
@@ -196,7 +198,7 @@ class State:
         if first.kind not in NOISE_KINDS:
             return [first]
 
-        def loudest(one: Candidate) -> bool:
+        def loudest(one: SuspectedFault) -> bool:
             return one.gyro == max(range(len(levels)), key=lambda gyro: mean_level(levels[gyro], one.first, one.last))
 
         return [one for one in noises[first.gyro] if one == first or loudest(one)]
@@ -205,13 +207,13 @@ class State:
         counts = self._counts(gyro, (), (*BIAS_KINDS, "scale"))
         return noise_level(found, gyro, counts, self._counts(gyro, NOISE_KINDS))
 
-    def _noises(self, state: NoiseLevel, gyro: int) -> list[Candidate]:
+    def _noises(self, state: NoiseLevel, gyro: int) -> list[SuspectedFault]:
         """Suspicions of noise where none is known yet."""
         free = self._counts(gyro, NOISE_KINDS) & state.counts
         state = replace(state, level=np.where(free, state.level, 0.0), counts=free)
         return list(suspect_noise(state, gyro, self.block_s, self.options.burst_s, self.options.threshold))
 
-    def _other_suspects(self, found: Residuals) -> list[Candidate]:
+    def _other_suspects(self, found: Residuals) -> list[SuspectedFault]:
         """The strongest suspicion of every gyro, of a step or drift and of a change of scale."""
         threshold, gyros = self.options.threshold, range(self.sums.gyros)
         slow = [self._slow(found, gyro) for gyro in gyros]
@@ -228,7 +230,7 @@ class State:
             suspects += [scale] if scale is not None and self._is_event(scale, ("scale",)) else []
         return suspects
 
-    def _bias_suspects(self, gyro: int, part: Slow, slow: Sequence[Slow]) -> list[Candidate]:
+    def _bias_suspects(self, gyro: int, part: Slow, slow: Sequence[Slow]) -> list[SuspectedFault]:
         """The strongest suspicion of a step or drift of a gyro; none where the others do the like."""
         threshold = self.options.threshold
         biases = suspect_bias(part, gyro, self.block_s, min(WORTH, threshold))
@@ -268,7 +270,7 @@ class State:
         most = found.expected + toggles + share**2 @ toggles
         return replace(found, variance=np.fmax(found.variance, most))
 
-    def _is_event(self, one: Candidate, kinds: Sequence[str]) -> bool:
+    def _is_event(self, one: SuspectedFault, kinds: Sequence[str]) -> bool:
         """What is off for all of a run, or a scale or noise for all of the recording, has nothing that it is off from.
 
         kinds : faults of these kinds of that gyro are not right either
@@ -278,7 +280,7 @@ class State:
         good[one.first : one.last] = False
         return bool(good.sum() >= LEAST_HEALTHY * rows.sum())
 
-    def _sized(self, taken: Sequence[Candidate], found: Residuals) -> list[Candidate]:
+    def _sized(self, taken: Sequence[SuspectedFault], found: Residuals) -> list[SuspectedFault]:
         """Noise over that of the gyro's healthy stretches, now that these are known."""
         sized = []
         for one in taken:

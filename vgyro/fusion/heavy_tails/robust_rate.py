@@ -41,7 +41,7 @@ MAD = 1.4826
 
 
 @dataclass(frozen=True)
-class Look:
+class RateSamples:
     """Some samples of N gyros: values [N, n], deg/s;  used [N, n];  borders : places at which a new stretch begins"""
 
     values: np.ndarray
@@ -50,7 +50,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Setting:
+class RateSetting:
     """How a recording is looked at.
 
     densities [N] : of each gyro's x;  usual [N] : size of its noise, deg/s;  offset [N] : from the others, deg/s
@@ -83,7 +83,9 @@ class Local:
     residual: np.ndarray
 
 
-def first_setting(looks: Sequence[Look], rate_hz: float, density: ScaleMixture, least: np.ndarray) -> Setting:
+def first_setting(
+    looks: Sequence[RateSamples], rate_hz: float, density: ScaleMixture, least: np.ndarray
+) -> RateSetting:
     """Offsets and sizes by medians; least [N] : of the sizes, deg/s."""
     values, used = (
         np.concatenate(parts, axis=1) for parts in zip(*((one.values, one.used) for one in looks), strict=True)
@@ -98,14 +100,14 @@ def first_setting(looks: Sequence[Look], rate_hz: float, density: ScaleMixture, 
     stand_in = _median(usual[usual > 0]) or _median(least[least > 0]) or 1.0
     usual = np.maximum(np.where(usual > 0, usual, stand_in), least)
     windows = (max(FEWEST_CENTRE, round(CENTRE_S * rate_hz)), max(FEWEST_SIZE, round(SIZE_S * rate_hz)))
-    return Setting([density] * len(values), usual, offset, *windows)
+    return RateSetting([density] * len(values), usual, offset, *windows)
 
 
 def _median(values: np.ndarray) -> float:
     return float(np.median(values)) if values.size else 0.0
 
 
-def start(look: Look, setting: Setting) -> Local:
+def start(look: RateSamples, setting: RateSetting) -> Local:
     """Where the rounds begin: at the middle of the gyros."""
     centre = np.repeat(setting.offset[:, None], look.values.shape[1], axis=1)
     size = np.repeat(setting.usual[:, None], look.values.shape[1], axis=1)
@@ -114,7 +116,7 @@ def start(look: Look, setting: Setting) -> Local:
     return Local(rate, own, rate, own, centre, size, look.values - centre - rate)
 
 
-def _middle(look: Look, centre: np.ndarray) -> np.ndarray:
+def _middle(look: RateSamples, centre: np.ndarray) -> np.ndarray:
     """Median [n] of the gyros that are used, or of all where none is."""
     values = look.values - centre
     if look.used.all():
@@ -122,7 +124,7 @@ def _middle(look: Look, centre: np.ndarray) -> np.ndarray:
     return np.asarray(np.nanmedian(np.where(look.used | ~look.used.any(axis=0), values, np.nan), axis=0))
 
 
-def improved(look: Look, setting: Setting, local: Local) -> Local:
+def improved(look: RateSamples, setting: RateSetting, local: Local) -> Local:
     """One more round: the rate by the gyros, then with the neighbours; offsets and sizes given the rate."""
     precision = _precision(look, setting, local.size, local.residual, local.variance)
     total = precision.sum(axis=0)
@@ -141,7 +143,7 @@ def improved(look: Look, setting: Setting, local: Local) -> Local:
 
 
 def _precision(
-    look: Look, setting: Setting, size: np.ndarray, residual: np.ndarray, variance: np.ndarray
+    look: RateSamples, setting: RateSetting, size: np.ndarray, residual: np.ndarray, variance: np.ndarray
 ) -> np.ndarray:  # fmt: skip
     """What each sample counts [N, n], 1/(deg/s)², by its residual [N, n] from a rate of some variance [n]."""
     precision = np.zeros_like(size)
@@ -153,7 +155,7 @@ def _precision(
 
 
 def _of_gyro(
-    gyro: int, look: Look, setting: Setting, precision: np.ndarray, rate: np.ndarray, known: np.ndarray,
+    gyro: int, look: RateSamples, setting: RateSetting, precision: np.ndarray, rate: np.ndarray, known: np.ndarray,
     before: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """m, s and y - m - ŵ [n] of one gyro from its precisions;  known : v [n] where it is used;  before : s so far"""
@@ -170,7 +172,7 @@ def _of_gyro(
     return centre, np.sqrt(np.maximum(size, (LEAST_SIZE * setting.usual[gyro]) ** 2)), residual
 
 
-def mean_log_variance(look: Look, local: Local, setting: Setting, reach: int) -> float:
+def mean_log_variance(look: RateSamples, local: Local, setting: RateSetting, reach: int) -> float:
     """Of what `reach` neighbours predict, over that of the gyros; NaN: there are too few samples."""
     if len(local.alone) <= 2 * reach:
         return float("nan")
@@ -180,7 +182,7 @@ def mean_log_variance(look: Look, local: Local, setting: Setting, reach: int) ->
 
 
 def _with_neighbours(
-    look: Look, alone: np.ndarray, own: np.ndarray, setting: Setting, before: Local
+    look: RateSamples, alone: np.ndarray, own: np.ndarray, setting: RateSetting, before: Local
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Mean and variance [n] of the rate from the gyros and from the samples before and after."""
     reach = setting.reach
@@ -195,7 +197,7 @@ def _with_neighbours(
 
 
 def _jumped(
-    look: Look, off: np.ndarray, predicted: np.ndarray, extra: np.ndarray, own: np.ndarray, setting: Setting,
+    look: RateSamples, off: np.ndarray, predicted: np.ndarray, extra: np.ndarray, own: np.ndarray, setting: RateSetting,
     before: Local,
 ) -> np.ndarray:  # fmt: skip
     """Samples [n] at which the gyros together are FAR from what the others predict;  off : how far they seem to be.
@@ -206,7 +208,7 @@ def _jumped(
     jumped = np.zeros(len(off), dtype=bool)
     places = np.flatnonzero(off**2 > 0.25 * FAR * (_usual(own) + extra))
     if places.size:
-        some = Look(look.values[:, places], look.used[:, places], np.empty(0, dtype=np.int64))
+        some = RateSamples(look.values[:, places], look.used[:, places], np.empty(0, dtype=np.int64))
         centre, size = before.centre[:, places], before.size[:, places]
         middle = _middle(some, centre)
         precision = _precision(some, setting, size, some.values - centre - middle, before.own[places])

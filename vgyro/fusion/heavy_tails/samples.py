@@ -22,8 +22,8 @@ from vgyro.fusion.heavy_tails.robust_rate import (
     LEAST_SIZE,
     REACHES,
     Local,
-    Look,
-    Setting,
+    RateSamples,
+    RateSetting,
     box,
     first_setting,
     improved,
@@ -103,7 +103,7 @@ def _pieces(samples: int) -> list[slice]:
     return [slice(first, min(first + PIECE, samples)) for first in range(0, samples, PIECE)]
 
 
-def _look(array: ArrayRates, rows: slice) -> Look:
+def _look(array: ArrayRates, rows: slice) -> RateSamples:
     values = np.array(array.rate[rows].T, dtype=float, order="C")
     used = np.ones(values.shape, dtype=bool)
     if array.missing is not None:
@@ -114,7 +114,7 @@ def _look(array: ArrayRates, rows: slice) -> Look:
                 used[gyro, max(first - rows.start, 0) : max(last - rows.start, 0)] = False
     used &= ~_stuck(values)
     used &= used.sum(axis=0) > 1
-    return Look(values, used, np.flatnonzero(np.diff(array.segment[rows])) + 1)
+    return RateSamples(values, used, np.flatnonzero(np.diff(array.segment[rows])) + 1)
 
 
 def _stuck(values: np.ndarray) -> np.ndarray:
@@ -129,7 +129,7 @@ def _stuck(values: np.ndarray) -> np.ndarray:
     return np.stack([box(one.astype(float), STUCK_SAMPLES) > 0.5 for one in small])
 
 
-def _found(looks: Sequence[Look], rate_hz: float, steps: np.ndarray) -> tuple[Setting, np.ndarray] | None:
+def _found(looks: Sequence[RateSamples], rate_hz: float, steps: np.ndarray) -> tuple[RateSetting, np.ndarray] | None:
     """How the recording is to be mended, and the factor [N] by which each variance falls, 0: not mended; None: not."""
     setting = first_setting(looks, rate_hz, WARY, 0.5 * steps)
     asked = setting.usual > steps
@@ -154,7 +154,7 @@ def _found(looks: Sequence[Look], rate_hz: float, steps: np.ndarray) -> tuple[Se
     return replace(setting, densities=densities), gains
 
 
-def _reach(looks: Sequence[Look], known: Sequence[Local], setting: Setting) -> int:
+def _reach(looks: Sequence[RateSamples], known: Sequence[Local], setting: RateSetting) -> int:
     """The neighbours that predict best, by the mean log variance."""
     pairs = list(zip(looks, known, strict=True))
     scores = np.array([[mean_log_variance(*pair, setting, reach) for reach in REACHES] for pair in pairs])
@@ -165,7 +165,7 @@ def _reach(looks: Sequence[Look], known: Sequence[Local], setting: Setting) -> i
     return REACHES[int(np.argmin(samples[told] @ scores[told]))]
 
 
-def _counts(looks: Sequence[Look], known: Sequence[Local], gyro: int) -> np.ndarray:
+def _counts(looks: Sequence[RateSamples], known: Sequence[Local], gyro: int) -> np.ndarray:
     """Histogram of the squares x² of the samples that are used."""
     total = np.zeros(len(middles()))
     for one, local in zip(looks, known, strict=True):
@@ -174,7 +174,7 @@ def _counts(looks: Sequence[Look], known: Sequence[Local], gyro: int) -> np.ndar
     return total
 
 
-def _gain(looks: Sequence[Look], known: Sequence[Local], setting: Setting, gyro: int) -> float:
+def _gain(looks: Sequence[RateSamples], known: Sequence[Local], setting: RateSetting, gyro: int) -> float:
     """Factor by which the gyro's variance falls; 0: its density does not pay for itself, or gains too little.
 
     Both densities have a size that follows the samples over the same window.
@@ -195,7 +195,7 @@ def _gain(looks: Sequence[Look], known: Sequence[Local], setting: Setting, gyro:
     return gain if 2.0 * (mixed - normal) > price and gain > LEAST_GAIN else 0.0
 
 
-def _normal_squares(look: Look, local: Local, setting: Setting, gyro: int) -> np.ndarray:
+def _normal_squares(look: RateSamples, local: Local, setting: RateSetting, gyro: int) -> np.ndarray:
     """Squares [n] about the local mean, of the samples that are used; 0 elsewhere."""
     used = look.used[gyro]
     off = np.where(used, look.values[gyro] - local.rate, 0.0)
@@ -203,7 +203,7 @@ def _normal_squares(look: Look, local: Local, setting: Setting, gyro: int) -> np
     return np.where(used, (off - centre) ** 2 + local.variance, 0.0)
 
 
-def _replace(array: ArrayRates, rate: np.ndarray, rows: slice, setting: Setting) -> int:
+def _replace(array: ArrayRates, rate: np.ndarray, rows: slice, setting: RateSetting) -> int:
     """Put pseudo-observations into `rate` [T, N], for some of the samples; how many are others."""
     halo = setting.size + setting.centre
     wide = slice(max(rows.start - halo, 0), min(rows.stop + halo, len(rate)))

@@ -19,10 +19,10 @@ from vgyro import engine as engines
 from vgyro.config import MOTION_MODELS
 from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError, EngineError
-from vgyro.fusion.motion.evidence import Piece, Spectrum, gather, spectrum
+from vgyro.fusion.motion.evidence import RateSpectrum, SpectrumPiece, gather, spectrum
 from vgyro.fusion.motion.lines import above_neighbours, fine_bands, peak, single, sinusoid, without_peaks
-from vgyro.fusion.motion.models import UNLIMITED, Candidate, Line, Motion
-from vgyro.fusion.motion.search import PRICE, Fit, crossing_of, line_price, refine, search, signal_of, still
+from vgyro.fusion.motion.models import UNLIMITED, Motion, MotionCandidate, SpectralLine
+from vgyro.fusion.motion.search import PRICE, MotionFit, crossing_of, line_price, refine, search, signal_of, still
 from vgyro.fusion.motion.start import wide_start
 
 DRIVEN = ("random_walk", "acceleration", "jerk")
@@ -42,17 +42,17 @@ CHECKED = 1 << 14
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedModels:
     """Models compared on the pieces of a recording without the sinusoids that were taken out of them.
 
     bands : of the spectrum, on which the fits were made
     fits  : in order of their cost;  spent : cost of the sinusoids
     """
 
-    pieces: list[Piece]
-    sinusoids: tuple[Line, ...]
-    bands: Spectrum
-    fits: list[Fit]
+    pieces: list[SpectrumPiece]
+    sinusoids: tuple[SpectralLine, ...]
+    bands: RateSpectrum
+    fits: list[MotionFit]
     spent: float
 
     @property
@@ -87,10 +87,10 @@ def choose_motion(
     found = (
         _best(pieces, rate_hz, families, shared)
         if lines
-        else _compared(Found(pieces, spectrum(pieces, rate_hz)), families)
+        else _compared(FoundLines(pieces, spectrum(pieces, rate_hz)), families)
     )
     rows = tuple(
-        Candidate(*_named(fit, found.sinusoids, models), fit.risk + found.spent, fit.cost + found.spent)
+        MotionCandidate(*_named(fit, found.sinusoids, models), fit.risk + found.spent, fit.cost + found.spent)
         for fit in found.fits
     )
     z, r, free = np.asarray(z, dtype=float), np.asarray(r, dtype=float), float(found.bands.weight.sum())
@@ -102,8 +102,8 @@ def choose_motion(
 
 
 def _named(
-    fit: Fit, sinusoids: tuple[Line, ...], models: Sequence[str]
-) -> tuple[str, dict[str, float], tuple[Line, ...]]:
+    fit: MotionFit, sinusoids: tuple[SpectralLine, ...], models: Sequence[str]
+) -> tuple[str, dict[str, float], tuple[SpectralLine, ...]]:
     """Model, parameters and lines of Motion: a single oscillation of a rate that is constant is an oscillator."""
     lines = (*sinusoids, *fit.lines)
     if fit.family:
@@ -123,39 +123,41 @@ def _families(models: Sequence[str]) -> list[str]:
 
 
 def _best(
-    pieces: list[Piece], rate_hz: float, families: Sequence[str], shared: Callable[[float], bool] | None
-) -> Compared:
+    pieces: list[SpectrumPiece], rate_hz: float, families: Sequence[str], shared: Callable[[float], bool] | None
+) -> ComparedModels:
     """With lines and without. Lines are looked for beside the motion that the spectrum without peaks has: other models
     take a line for a part of themselves."""
     whole = spectrum(pieces, rate_hz)
-    plain = _compared(Found(pieces, whole), families)
+    plain = _compared(FoundLines(pieces, whole), families)
     bare = still(plain.bands) if single(whole) else _bare(plain.bands)
     found = _lines(pieces, whole, bare, shared)
     if found.foreign:
-        plain = _compared(Found(pieces, whole.without(found.foreign)), families)
+        plain = _compared(FoundLines(pieces, whole.without(found.foreign)), families)
     if not found.lines and not found.sinusoids:
         return plain
     return min(plain, _compared(found, families), key=lambda one: one.cost)
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundLines:
     """Lines of a recording.
 
     pieces, whole : without the sinusoids, and all lines of their spectrum, without the bands `foreign`
     sinusoids, lines : of the motion, without and with a width;  foreign : bands of lines that are none, Hz
     """
 
-    pieces: list[Piece]
-    whole: Spectrum
-    sinusoids: tuple[Line, ...] = ()
-    lines: tuple[Line, ...] = ()
+    pieces: list[SpectrumPiece]
+    whole: RateSpectrum
+    sinusoids: tuple[SpectralLine, ...] = ()
+    lines: tuple[SpectralLine, ...] = ()
     foreign: tuple[tuple[float, float], ...] = ()
 
 
-def _lines(pieces: list[Piece], whole: Spectrum, bare: Fit, shared: Callable[[float], bool] | None) -> Found:
+def _lines(
+    pieces: list[SpectrumPiece], whole: RateSpectrum, bare: MotionFit, shared: Callable[[float], bool] | None
+) -> FoundLines:
     """Lines that are worth their price beside the motion `bare`, the one that lowers the risk most first."""
-    found = Found(pieces, whole)
+    found = FoundLines(pieces, whole)
     while len(found.lines) + len(found.sinusoids) < MOST_LINES and len(found.foreign) < MOST_FOREIGN:
         there = peak(found.whole, signal_of(found.whole, bare, found.lines))
         if there.gain < line_price(whole):
@@ -187,7 +189,7 @@ class AtRest:
     noise : part of the variance of the samples that is not the vibrations'
     """
 
-    lines: tuple[Line, ...] = ()
+    lines: tuple[SpectralLine, ...] = ()
     lost: float = 0.0
     noise: float = 1.0
 
@@ -211,7 +213,7 @@ def beside_fixed(
         return AtRest()
     pieces = gather(z, r, segment, rate_hz, phi, None)
     whole = spectrum(pieces, rate_hz)
-    bare = Fit(fixed.model, fixed.parameters, (), np.empty(0), 0.0, 0.0)
+    bare = MotionFit(fixed.model, fixed.parameters, (), np.empty(0), 0.0, 0.0)
     found = _lines(pieces, above_neighbours(whole), bare, shared)
     lines = tuple(line for line in found.lines if line.damping < WIDE)
     rest = fine_bands(spectrum(found.pieces, rate_hz).without(found.foreign), [line.frequency_hz for line in lines])
@@ -219,7 +221,9 @@ def beside_fixed(
     return AtRest((*found.sinusoids, *lines), lost, _not_vibration(pieces, found.pieces, lines))
 
 
-def _not_vibration(pieces: Sequence[Piece], left: Sequence[Piece], lines: Sequence[Line]) -> float:
+def _not_vibration(
+    pieces: Sequence[SpectrumPiece], left: Sequence[SpectrumPiece], lines: Sequence[SpectralLine]
+) -> float:
     """Part of the variance of the pieces that is in those without the sinusoids `left`, and not of the lines."""
     total = sum(float(piece.z @ piece.z) for piece in pieces)
     samples = sum(len(piece.z) for piece in pieces)
@@ -227,13 +231,13 @@ def _not_vibration(pieces: Sequence[Piece], left: Sequence[Piece], lines: Sequen
     return max(noise / total, LEAST_NOISE) if total > 0 else 1.0
 
 
-def _bare(bands: Spectrum) -> Fit:
+def _bare(bands: RateSpectrum) -> MotionFit:
     """The motion without lines, about."""
     smooth = without_peaks(bands)
     return min((search(smooth, family, (), 0.0) for family in DRIVEN), key=lambda fit: fit.cost)
 
 
-def _compared(found: Found, families: Sequence[str]) -> Compared:
+def _compared(found: FoundLines, families: Sequence[str]) -> ComparedModels:
     whole, lines = found.whole, found.lines
     bands = fine_bands(whole, [line.frequency_hz for line in lines])
     fits = [still(bands, lines)]
@@ -244,16 +248,16 @@ def _compared(found: Found, families: Sequence[str]) -> Compared:
     fits += [search(bands, family, lines, crossing) for family in families if family not in DRIVEN]
     fits = [fit for fit in fits if not fit.family or fit.family in families]
     fits.sort(key=lambda fit: fit.cost)
-    return Compared(found.pieces, found.sinusoids, bands, fits, _spent(found.sinusoids, whole))
+    return ComparedModels(found.pieces, found.sinusoids, bands, fits, _spent(found.sinusoids, whole))
 
 
-def _spent(sinusoids: tuple[Line, ...], whole: Spectrum) -> float:
+def _spent(sinusoids: tuple[SpectralLine, ...], whole: RateSpectrum) -> float:
     """Of each its frequency; in each piece its amplitude and phase, which count as one line of the periodogram."""
     share = 0.5 * float(np.mean(whole.weight)) * whole.pieces
     return len(sinusoids) * (line_price(whole) - 2.0 * PRICE + SPENT * share)
 
 
-def _stands(motion: Motion, z: np.ndarray, r: np.ndarray, phi: float, pieces: list[Piece], engine: str) -> bool:
+def _stands(motion: Motion, z: np.ndarray, r: np.ndarray, phi: float, pieces: list[SpectrumPiece], engine: str) -> bool:
     """The smoother itself does not break down on the longest piece, and its estimated risk is below no smoothing's."""
     longest = max(pieces, key=lambda piece: len(piece.z))
     part = slice(longest.start, longest.start + min(len(longest.z), CHECKED))
@@ -274,7 +278,7 @@ def _stands(motion: Motion, z: np.ndarray, r: np.ndarray, phi: float, pieces: li
     return bool(float(np.mean(left / noise[told])) < 2.0)
 
 
-def _lost(spectrum: Spectrum, signal: np.ndarray) -> float:
+def _lost(spectrum: RateSpectrum, signal: np.ndarray) -> float:
     """Variance of the motion that the smoother takes away, (deg/s)²: ∫ (1 - H)²·(S_z - S_v), as far as it is certain.
 
     signal : S [F], which makes the smoother and need not be the density of the motion

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.fusion.motion.models import Line
+from vgyro.fusion.motion.models import SpectralLine
 
 Values = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Family:
+class DensityFamily:
     """Models of one kind.
 
     model   : as Motion.model;  names : of the parameters
@@ -89,17 +89,17 @@ def pair_power(own: np.ndarray, damping: np.ndarray, second: np.ndarray, loss: n
 PAIR = ("frequency_hz", "damping", "second_hz", "second_damping", "sd")
 LINE = ("frequency_hz", "damping", "sd")
 FAMILIES = {
-    "random_walk": Family("random_walk", ("q",), _walk),
-    "acceleration": Family("acceleration", ("q",), _driven(2)),
-    "jerk": Family("jerk", ("q",), _driven(3)),
-    "markov": Family("markov", ("tau_s", "sd"), _markov),
-    "resonance": Family("oscillator", LINE, _resonance),
-    "oscillator": Family("oscillator", (*LINE, "q"), _oscillator),
-    "pair": Family("oscillator", PAIR, _pair),
+    "random_walk": DensityFamily("random_walk", ("q",), _walk),
+    "acceleration": DensityFamily("acceleration", ("q",), _driven(2)),
+    "jerk": DensityFamily("jerk", ("q",), _driven(3)),
+    "markov": DensityFamily("markov", ("tau_s", "sd"), _markov),
+    "resonance": DensityFamily("oscillator", LINE, _resonance),
+    "oscillator": DensityFamily("oscillator", (*LINE, "q"), _oscillator),
+    "pair": DensityFamily("oscillator", PAIR, _pair),
 }
 
 
-def of_line(line: Line, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def of_line(line: SpectralLine, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
     """Density [F] of a line."""
     values = {name: np.array(getattr(line, name)) for name in LINE}
     return _resonance(values, frequency, rate_hz)

@@ -27,7 +27,7 @@ PER_OCTAVE = 24
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class RateSpectrum:
     """Periodograms of all pieces, each line or means over bands. Arrays [F], frequency above 0 and below half the rate.
 
     frequency : Hz, rising;  power, noise : densities of z and of its noise, two-sided, deg²/s
@@ -53,13 +53,13 @@ class Spectrum:
         found: np.ndarray = ((1.0 - H) ** 2 * (self.power / self.noise) + 2.0 * H - 1.0) @ self.weight
         return found
 
-    def between(self, low: float, high: float) -> Spectrum:
+    def between(self, low: float, high: float) -> RateSpectrum:
         """The lines of these frequencies, Hz."""
         part = slice(*np.searchsorted(self.frequency, [low, high]).tolist())
         arrays = {name: getattr(self, name)[part] for name in ("frequency", "power", "noise", "weight")}
         return replace(self, **arrays)
 
-    def without(self, bands: Sequence[tuple[float, float]]) -> Spectrum:
+    def without(self, bands: Sequence[tuple[float, float]]) -> RateSpectrum:
         """But for lines in these bands, from and to, Hz."""
         keep = np.ones(len(self.frequency), dtype=bool)
         for low, high in bands:
@@ -67,20 +67,20 @@ class Spectrum:
         arrays = {name: getattr(self, name)[keep] for name in ("frequency", "power", "noise", "weight")}
         return replace(self, **arrays)
 
-    def bands(self) -> Spectrum:
+    def bands(self) -> RateSpectrum:
         """Means over bands of equal width on the logarithm of the frequency, where they hold more than one line."""
         place = np.floor(np.log2(self.frequency / self.frequency[0]) * PER_OCTAVE)
         return self.merged(np.flatnonzero(np.diff(place, prepend=-1.0)))
 
-    def merged(self, first: np.ndarray) -> Spectrum:
+    def merged(self, first: np.ndarray) -> RateSpectrum:
         """Weighted means over the lines from each of `first` [F'] to the next."""
         total = np.add.reduceat(self.weight, first)
         means = [np.add.reduceat(self.weight * one, first) / total for one in (self.frequency, self.power, self.noise)]
-        return Spectrum(means[0], means[1], means[2], total, self.rate_hz, self.pieces)
+        return RateSpectrum(means[0], means[1], means[2], total, self.rate_hz, self.pieces)
 
 
 @dataclass(frozen=True)
-class Piece:
+class SpectrumPiece:
     """A stretch of samples without a gap.
 
     start : its first sample;  z : [T], deg/s, without its mean under the taper, filled where it says nothing
@@ -103,20 +103,20 @@ class Piece:
         return _frequencies(len(self.z), rate_hz), power, np.full(len(power), weight)
 
 
-def spectrum(pieces: list[Piece], rate_hz: float) -> Spectrum:
+def spectrum(pieces: list[SpectrumPiece], rate_hz: float) -> RateSpectrum:
     """All lines of all pieces."""
     parts = [piece.lines(rate_hz) for piece in pieces]
     frequency, power, weight = (np.concatenate([part[k] for part in parts]) for k in range(3))
     noise = np.concatenate([piece.noise for piece in pieces])
     if len(pieces) == 1:
-        return Spectrum(frequency, power, noise, weight, rate_hz, 1)
+        return RateSpectrum(frequency, power, noise, weight, rate_hz, 1)
     order = np.argsort(frequency, kind="stable")
-    return Spectrum(frequency[order], power[order], noise[order], weight[order], rate_hz, len(pieces))
+    return RateSpectrum(frequency[order], power[order], noise[order], weight[order], rate_hz, len(pieces))
 
 
 def gather(
     z: np.ndarray, r: float | np.ndarray, segment: np.ndarray, rate_hz: float, phi: float, moving: np.ndarray | None
-) -> list[Piece]:
+) -> list[SpectrumPiece]:
     """The pieces of a recording on which models are compared.  raises : DataError, TooShort"""
     z, r = np.asarray(z, dtype=float), np.asarray(r, dtype=float)
     told = np.broadcast_to(np.isfinite(r), z.shape)
@@ -178,7 +178,9 @@ def _spread(runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return [pieces[k] for k in sorted(np.argsort(-length, kind="stable")[:MOST].tolist())]
 
 
-def _piece(z: np.ndarray, r: np.ndarray, told: np.ndarray, run: tuple[int, int], phi: float, rate_hz: float) -> Piece:
+def _piece(
+    z: np.ndarray, r: np.ndarray, told: np.ndarray, run: tuple[int, int], phi: float, rate_hz: float
+) -> SpectrumPiece:
     part = slice(*run)
     own, known, taper = z[part], told[part], taper_of(run[1] - run[0])
     variance = np.broadcast_to(r, z.shape)[part]
@@ -191,7 +193,7 @@ def _piece(z: np.ndarray, r: np.ndarray, told: np.ndarray, run: tuple[int, int],
         own = np.interp(np.arange(len(own)), places, own[places])
         noise = _of_filled(places, taper[places] ** 2 * variance[places], turn)
     noise = noise / (float(taper @ taper) * rate_hz) * (1.0 - phi**2) / np.abs(1.0 - phi * turn) ** 2
-    return Piece(run[0], own - float(taper @ own) / float(taper.sum()), taper, noise)
+    return SpectrumPiece(run[0], own - float(taper @ own) / float(taper.sum()), taper, noise)
 
 
 def taper_of(samples: int) -> np.ndarray:

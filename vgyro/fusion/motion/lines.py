@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vgyro.fusion.motion.evidence import PER_OCTAVE, Piece, Spectrum
-from vgyro.fusion.motion.models import Line
+from vgyro.fusion.motion.evidence import PER_OCTAVE, RateSpectrum, SpectrumPiece
+from vgyro.fusion.motion.models import SpectralLine
 
 SHARP = 4
 """Lines of a periodogram over which its taper spreads a sinusoid."""
@@ -41,12 +41,12 @@ class Peak:
         """From and to, Hz, with the skirts of the taper."""
         return self.frequency_hz - SKIRT * self.width_hz, self.frequency_hz + SKIRT * self.width_hz
 
-    def line(self) -> Line:
+    def line(self) -> SpectralLine:
         """With the density of the peak: an oscillation of damping ζ is 2ζf wide."""
-        return Line(self.frequency_hz, min(max(0.5 * self.width_hz / self.frequency_hz, 1e-5), 0.5), self.sd)
+        return SpectralLine(self.frequency_hz, min(max(0.5 * self.width_hz / self.frequency_hz, 1e-5), 0.5), self.sd)
 
 
-def single(spectrum: Spectrum) -> bool:
+def single(spectrum: RateSpectrum) -> bool:
     """Nearly all the power beside the noise is in one line, and that is not the end of a slow motion."""
     above = np.append(0.0, np.cumsum(np.maximum(spectrum.power - spectrum.noise, 0.0)))
     size = min((2 * SHARP + 1) * spectrum.pieces, len(above) - 1)
@@ -54,7 +54,7 @@ def single(spectrum: Spectrum) -> bool:
     return float(inside.max()) > NEARLY_ALL * float(above[-1]) and float(above[size // 2]) < 0.5 * float(above[-1])
 
 
-def without_peaks(spectrum: Spectrum) -> Spectrum:
+def without_peaks(spectrum: RateSpectrum) -> RateSpectrum:
     """The bands with the median of their neighbours: a line is narrower than that."""
     from scipy.ndimage import median_filter
 
@@ -62,7 +62,7 @@ def without_peaks(spectrum: Spectrum) -> Spectrum:
     return replace(spectrum, power=median_filter(power, NEIGHBOURS, mode="nearest") * spectrum.noise)
 
 
-def above_neighbours(spectrum: Spectrum) -> Spectrum:
+def above_neighbours(spectrum: RateSpectrum) -> RateSpectrum:
     """All lines, with a noise that is not below the median of BESIDE lines about each: what is broad is no line.
 
     A periodogram's line is exponential: its median is ln 2 of its mean.
@@ -73,7 +73,7 @@ def above_neighbours(spectrum: Spectrum) -> Spectrum:
     return replace(spectrum, noise=np.maximum(spectrum.noise, floor))
 
 
-def peak(spectrum: Spectrum, signal: np.ndarray) -> Peak:
+def peak(spectrum: RateSpectrum, signal: np.ndarray) -> Peak:
     """In windows of 1, 2, 4 … lines of the periodogram: the smallest that has SHARE of the most that one has.
 
     signal : S [F], of the motion without the line
@@ -103,13 +103,13 @@ def peak(spectrum: Spectrum, signal: np.ndarray) -> Peak:
     )
 
 
-def _resolution(spectrum: Spectrum) -> float:
+def _resolution(spectrum: RateSpectrum) -> float:
     """Distance of the lines of one piece, Hz, about."""
     span = spectrum.frequency[-1] - spectrum.frequency[0]
     return float(span) * spectrum.pieces / max(len(spectrum.frequency) - 1, 1)
 
 
-def fine_bands(spectrum: Spectrum, lines: Sequence[float]) -> Spectrum:
+def fine_bands(spectrum: RateSpectrum, lines: Sequence[float]) -> RateSpectrum:
     """Bands of all lines of the periodograms, but for those near the frequencies `lines`, Hz."""
     if not lines:
         return spectrum.bands()
@@ -121,7 +121,7 @@ def fine_bands(spectrum: Spectrum, lines: Sequence[float]) -> Spectrum:
     return spectrum.merged(np.flatnonzero(first))
 
 
-def sinusoid(pieces: list[Piece], rate_hz: float, about_hz: float) -> tuple[Line, list[Piece]]:
+def sinusoid(pieces: list[SpectrumPiece], rate_hz: float, about_hz: float) -> tuple[SpectralLine, list[SpectrumPiece]]:
     """The sinusoid next to a frequency, in all pieces with amplitudes and phases of their own; and what is left.
 
     Its frequency is where the periodogram of the tapered samples is highest.
@@ -145,7 +145,7 @@ def sinusoid(pieces: list[Piece], rate_hz: float, about_hz: float) -> tuple[Line
         size = np.linalg.lstsq(tapered.T @ basis, tapered.T @ piece.z, rcond=None)[0]
         left.append(replace(piece, z=piece.z - basis @ size))
         squares, total = squares + float(size @ size) * len(piece.z), total + len(piece.z)
-    return Line(found, 1e-9, math.sqrt(0.5 * squares / total)), left
+    return SpectralLine(found, 1e-9, math.sqrt(0.5 * squares / total)), left
 
 
 ROW = 256

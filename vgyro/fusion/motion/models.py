@@ -27,7 +27,7 @@ Q_UNITS = {"random_walk": " deg²/s³", "acceleration": " deg²/s⁵", "jerk": "
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """A narrow line of the motion, a vibration: x'' + 2ζω·x' + ω²·x = white noise.
 
     damping : ζ; at most NARROW: a sinusoid, which nothing drives;  sd : of the oscillation, deg/s
@@ -44,7 +44,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class MotionCandidate:
     """How well a model smooths.
 
     risk : squared error of the smoother, estimated, in units of the noise, summed
@@ -53,7 +53,7 @@ class Candidate:
 
     model: str
     parameters: Mapping[str, float]
-    lines: tuple[Line, ...]
+    lines: tuple[SpectralLine, ...]
     risk: float
     cost: float
 
@@ -76,9 +76,9 @@ class Motion:
     model: str
     parameters: Mapping[str, float]
     rate_hz: float
-    table: tuple[Candidate, ...] = ()
+    table: tuple[MotionCandidate, ...] = ()
     calibration: float = 1.0
-    lines: tuple[Line, ...] = ()
+    lines: tuple[SpectralLine, ...] = ()
 
     @property
     def text(self) -> str:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.fusion.motion.density import FAMILIES, LINE, PAIR, Family, of_line, pair_power
-from vgyro.fusion.motion.evidence import Spectrum
-from vgyro.fusion.motion.models import Line
+from vgyro.fusion.motion.density import FAMILIES, LINE, PAIR, DensityFamily, of_line, pair_power
+from vgyro.fusion.motion.evidence import RateSpectrum
+from vgyro.fusion.motion.models import SpectralLine
 
 PRICE = 4.0
 """What a parameter costs, in units of the noise: 2 for the fall of the estimated risk with it where there is nothing to
@@ -32,7 +32,7 @@ WIDEST = 1.5
 
 
 @dataclass(frozen=True)
-class Fit:
+class MotionFit:
     """A family with its parameters, and the lines beside it that have a width.
 
     signal : S [F];  risk : as estimated;  price : of the parameters
@@ -40,7 +40,7 @@ class Fit:
 
     family: str
     values: Mapping[str, float]
-    lines: tuple[Line, ...]
+    lines: tuple[SpectralLine, ...]
     signal: np.ndarray
     risk: float
     price: float
@@ -50,13 +50,13 @@ class Fit:
         return self.risk + self.price
 
 
-def still(spectrum: Spectrum, lines: tuple[Line, ...] = ()) -> Fit:
+def still(spectrum: RateSpectrum, lines: tuple[SpectralLine, ...] = ()) -> MotionFit:
     """A rate that does not move, but for the lines."""
     signal = _of_lines(spectrum, lines)
-    return Fit("", {}, lines, signal, float(spectrum.risk(signal)), _price(spectrum, (), len(lines)))
+    return MotionFit("", {}, lines, signal, float(spectrum.risk(signal)), _price(spectrum, (), len(lines)))
 
 
-def search(spectrum: Spectrum, family: str, lines: tuple[Line, ...], crossing: float) -> Fit:
+def search(spectrum: RateSpectrum, family: str, lines: tuple[SpectralLine, ...], crossing: float) -> MotionFit:
     """Least risk of a family beside the lines, whose parameters are then searched with it.
 
     crossing : frequency at which rate and noise are alike, about
@@ -73,8 +73,12 @@ def search(spectrum: Spectrum, family: str, lines: tuple[Line, ...], crossing: f
 
 
 def refine(
-    spectrum: Spectrum, family: str, start: np.ndarray, lines: tuple[Line, ...], beside: np.ndarray | None = None
-) -> Fit:
+    spectrum: RateSpectrum,
+    family: str,
+    start: np.ndarray,
+    lines: tuple[SpectralLine, ...],
+    beside: np.ndarray | None = None,
+) -> MotionFit:
     """Least risk from a start, of the parameters of family and lines together; family "": of the lines alone.
 
     beside : S [F], of the rest of the motion, which stays as it is
@@ -92,11 +96,17 @@ def refine(
 
     logs, found, risk = _descend(spectrum, signal, logs, low, high)
     values = dict(zip(names, np.exp(logs[: len(names)]).tolist(), strict=True))
-    return Fit(family, values, _lines(np.exp(logs[len(names) :])), found, risk, _price(spectrum, names, len(lines)))
+    return MotionFit(
+        family, values, _lines(np.exp(logs[len(names) :])), found, risk, _price(spectrum, names, len(lines))
+    )
 
 
 def _descend(
-    spectrum: Spectrum, signal: Callable[[np.ndarray], np.ndarray], logs: np.ndarray, low: np.ndarray, high: np.ndarray
+    spectrum: RateSpectrum,
+    signal: Callable[[np.ndarray], np.ndarray],
+    logs: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Logarithms of the parameters, S and risk, where it is least."""
     here, damping = signal(logs), 1e-2
@@ -124,7 +134,9 @@ def _descend(
     return logs, here, risk
 
 
-def _signal(spectrum: Spectrum, kind: Family | None, lines: tuple[Line, ...], values: np.ndarray) -> np.ndarray:
+def _signal(
+    spectrum: RateSpectrum, kind: DensityFamily | None, lines: tuple[SpectralLine, ...], values: np.ndarray
+) -> np.ndarray:
     whole = _of_lines(spectrum, lines)
     if kind is None:
         return whole
@@ -133,29 +145,29 @@ def _signal(spectrum: Spectrum, kind: Family | None, lines: tuple[Line, ...], va
     return found
 
 
-def _of_lines(spectrum: Spectrum, lines: tuple[Line, ...]) -> np.ndarray:
+def _of_lines(spectrum: RateSpectrum, lines: tuple[SpectralLine, ...]) -> np.ndarray:
     return sum((of_line(one, spectrum.frequency, spectrum.rate_hz) for one in lines), np.zeros(len(spectrum.power)))
 
 
-def _lines(values: np.ndarray) -> tuple[Line, ...]:
-    return tuple(Line(*one) for one in values.reshape(-1, len(LINE)).tolist())
+def _lines(values: np.ndarray) -> tuple[SpectralLine, ...]:
+    return tuple(SpectralLine(*one) for one in values.reshape(-1, len(LINE)).tolist())
 
 
-def _price(spectrum: Spectrum, names: tuple[str, ...], lines: int) -> float:
+def _price(spectrum: RateSpectrum, names: tuple[str, ...], lines: int) -> float:
     return PRICE * len(names) + line_price(spectrum) * lines
 
 
-def line_price(spectrum: Spectrum) -> float:
+def line_price(spectrum: RateSpectrum) -> float:
     """Of three parameters. The frequency costs 2·ln(frequencies) more, as it is the best of so many."""
     return len(LINE) * PRICE + 2.0 * math.log(max(0.5 * float(spectrum.weight.sum()), 1.0))
 
 
-def signal_of(spectrum: Spectrum, fit: Fit, lines: tuple[Line, ...]) -> np.ndarray:
+def signal_of(spectrum: RateSpectrum, fit: MotionFit, lines: tuple[SpectralLine, ...]) -> np.ndarray:
     """S [F] of a fit with these lines at other frequencies than it was made on."""
     return _signal(spectrum, FAMILIES.get(fit.family), lines, np.array(list(fit.values.values())))
 
 
-def _bounds(spectrum: Spectrum) -> dict[str, tuple[float, float]]:
+def _bounds(spectrum: RateSpectrum) -> dict[str, tuple[float, float]]:
     lowest = spectrum.frequency[0]
     hertz = (0.01 * lowest, FASTEST * spectrum.rate_hz)
     size = math.sqrt(float(spectrum.noise.mean()) * spectrum.rate_hz)
@@ -165,13 +177,13 @@ def _bounds(spectrum: Spectrum) -> dict[str, tuple[float, float]]:
     }  # fmt: skip
 
 
-def _line_bounds(spectrum: Spectrum, line: Line) -> tuple[tuple[float, float], ...]:
+def _line_bounds(spectrum: RateSpectrum, line: SpectralLine) -> tuple[tuple[float, float], ...]:
     """Of frequency, damping and s.d.: a line stays where it was found."""
     middle = min(max(line.frequency_hz, spectrum.frequency[0]), LINES_END * spectrum.rate_hz)
     return (middle / NEAR, middle * NEAR), LINE_DAMPING, _bounds(spectrum)["sd"]
 
 
-def crossing_of(spectrum: Spectrum, signal: np.ndarray) -> float:
+def crossing_of(spectrum: RateSpectrum, signal: np.ndarray) -> float:
     """Highest frequency at which the signal is above the noise, Hz; the lowest there is where it never is."""
     above = np.flatnonzero(signal >= spectrum.noise)
     return float(spectrum.frequency[above[-1]]) if above.size else float(spectrum.frequency[0])
@@ -181,24 +193,24 @@ def _product(*sides: np.ndarray | tuple[float, ...]) -> np.ndarray:
     return np.stack([one.ravel() for one in np.meshgrid(*sides, indexing="ij")], axis=1)
 
 
-def _driven_grid(order: int) -> Callable[[Spectrum, float], np.ndarray]:
+def _driven_grid(order: int) -> Callable[[RateSpectrum, float], np.ndarray]:
     """The frequency at which rate and noise have the same density, q = N²·(2π·f)^(2·order)."""
 
-    def grid(spectrum: Spectrum, crossing: float) -> np.ndarray:  # noqa: ARG001
+    def grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:  # noqa: ARG001
         places = np.geomspace(0.03 * spectrum.frequency[0], spectrum.rate_hz, 30)
         return (spectrum.noise[0] * (2.0 * math.pi * places) ** (2 * order))[:, None]
 
     return grid
 
 
-def _markov_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+def _markov_grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:
     """Time constants, each with the variance for which rate and noise are alike at the crossing."""
     tau = np.geomspace(2.0 / spectrum.rate_hz, 100.0 / spectrum.frequency[0], 12)
     q = spectrum.noise[0] * (2.0 * math.pi * crossing) ** 2
     return np.stack([tau, np.sqrt(0.5 * q * tau)], axis=1)
 
 
-def _level(spectrum: Spectrum, crossing: np.ndarray, *sections: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def _level(spectrum: RateSpectrum, crossing: np.ndarray, *sections: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """Density at 0 Hz of a product of sections which at the crossing is that of the noise."""
     level = np.full(len(crossing), spectrum.noise[0])
     for own, damping in sections:
@@ -207,7 +219,7 @@ def _level(spectrum: Spectrum, crossing: np.ndarray, *sections: tuple[np.ndarray
     return level
 
 
-def _resonance_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+def _resonance_grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:
     """Below the crossing, and at the highest line."""
     peak = spectrum.frequency[int(np.argmax(spectrum.power * spectrum.weight))]
     hertz = np.minimum(np.append(crossing * np.array([0.1, 0.3, 0.6, 1.0]), peak), FASTEST * spectrum.rate_hz)
@@ -216,7 +228,7 @@ def _resonance_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
     return np.stack([own, damping, np.sqrt(level * 2.0 * math.pi * own / (4.0 * damping))], axis=1)
 
 
-def _oscillator_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+def _oscillator_grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:
     """The resonances about random walks of a hundredth to a half of their frequency."""
     place = np.repeat(_resonance_grid(spectrum, crossing), 3, axis=0)
     share = np.tile([0.01, 0.1, 0.5], len(place) // 3)
@@ -224,7 +236,7 @@ def _oscillator_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
     return np.column_stack([place, q])
 
 
-def _pair_grid(spectrum: Spectrum, crossing: float) -> np.ndarray:
+def _pair_grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:
     """Both below the crossing or at it, from sharp to wide."""
     first = np.minimum(crossing * np.array([0.3, 0.6, 0.9]), 0.4 * FASTEST * spectrum.rate_hz)
     own, ratio, damping, loss, at = _product(

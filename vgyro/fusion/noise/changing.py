@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
-from vgyro.fusion.noise.cornered_hat import LEAST_SHARE, Best, best_weights, outliers
+from vgyro.fusion.noise.cornered_hat import LEAST_SHARE, BestWeights, best_weights, outliers
 from vgyro.fusion.noise.difference_blocks import BlockMoments
 from vgyro.fusion.noise.variance_model import Memory, chosen_memory
 
@@ -99,7 +99,7 @@ def _squares(moments: BlockMoments, variance: np.ndarray, used: np.ndarray, corr
 
 
 def _slow_part(
-    moments: BlockMoments, best: Best, variance: np.ndarray, used: np.ndarray, mean: np.ndarray
+    moments: BlockMoments, best: BestWeights, variance: np.ndarray, used: np.ndarray, mean: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Mean of the residuals' means [M, N] over the blocks about each, by their variances; and the variance it takes."""
     rest = np.maximum(variance - best.variance[:, None], 1e-6 * variance)

@@ -57,14 +57,14 @@ def pair_variances(square: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Best:
+class BestWeights:
     """The best linear estimate of the rate: weights [M, N], Σ = 1, of either sign, and its variance r [M], (deg/s)²."""
 
     weights: np.ndarray
     variance: np.ndarray
 
 
-def best_weights(variance: np.ndarray, excluded: np.ndarray, correlation: np.ndarray) -> Best:
+def best_weights(variance: np.ndarray, excluded: np.ndarray, correlation: np.ndarray) -> BestWeights:
     """u = R⁻¹1/(1'R⁻¹1) and r = 1/(1'R⁻¹1) of the gyros that are not excluded, R = σσ'∘C.
 
     variance [M, N] (deg/s)²; excluded [M, N], whose weights are 0; correlation [N, N]. All excluded: as if none were.
@@ -77,7 +77,7 @@ def best_weights(variance: np.ndarray, excluded: np.ndarray, correlation: np.nda
         share = inverse * (inverse @ np.linalg.inv(correlation[np.ix_(kept, kept)]))
         total[rows] = 1.0 / share.sum(axis=1)
         weights[np.ix_(rows, kept)] = share * total[rows, None]
-    return Best(weights, total)
+    return BestWeights(weights, total)
 
 
 def patterns(excluded: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:

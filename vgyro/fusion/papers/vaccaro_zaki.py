@@ -26,7 +26,7 @@ SMALLEST = 1e-12
 
 
 @dataclass(frozen=True)
-class DriftModel:
+class AllanDrift:
     """Gyros with white noise and random walks: R [N, N], (deg/s)²/Hz; Q [N, N], (deg/s)²/s, positive semidefinite.
 
     rank : of Q, by what was left out to make it so
@@ -73,7 +73,7 @@ def not_known(weights: np.ndarray, used: np.ndarray) -> str:
     return f"without gyro {', '.join(map(str, left))}, of which no Allan covariance is known" if len(left) else ""
 
 
-def drift_model(scales: AllanScales) -> DriftModel:
+def drift_model(scales: AllanScales) -> AllanDrift:
     """R and Q by least squares over τ, element by element: C_ij(τ) = R_ij/τ + Q_ij·τ/3, R_ii and Q_ii >= 0.
 
     A walk of less than the share FOLLOWED of the Allan variance at the longest τ is none.
@@ -98,7 +98,7 @@ def drift_model(scales: AllanScales) -> DriftModel:
             R[i, j] = R[j, i] = values[0]
             Q[i, j] = Q[j, i] = values[1]
     Q, rank = _semidefinite(Q)
-    return DriftModel(R, Q, rank)
+    return AllanDrift(R, Q, rank)
 
 
 def _variance_terms(terms: np.ndarray, variance: np.ndarray, lost: np.ndarray) -> np.ndarray:
@@ -161,7 +161,7 @@ def _semidefinite(Q: np.ndarray) -> tuple[np.ndarray, int]:
     return near, int(good.sum())
 
 
-def least_drift(model: DriftModel) -> tuple[np.ndarray, float]:
+def least_drift(model: AllanDrift) -> tuple[np.ndarray, float]:
     """c [N] = Q⁻¹1/(1'Q⁻¹1) and 1/(1'Q⁻¹1), (deg/s)²/s, the variance of its walk a second.
 
     Where Q is singular, by its pseudo-inverse, which has as many eigenvalues as Q has rank (their eq. 54): what has no
@@ -177,7 +177,7 @@ def least_drift(model: DriftModel) -> tuple[np.ndarray, float]:
     return inverse / total, 1.0 / total
 
 
-def _rank(model: DriftModel) -> str:
+def _rank(model: AllanDrift) -> str:
     gyros = len(model.Q)
     still = np.flatnonzero(np.diag(model.Q) == 0) + 1
     if model.rank == gyros:

@@ -25,7 +25,7 @@ ORDERS = np.arange(1, TERMS + 1)
 
 
 @dataclass(frozen=True)
-class Grid:
+class CountGrid:
     """Values that the gyros can have: whole numbers of `step` [N], deg/s, 0: any, above `begin` [N], deg/s."""
 
     step: np.ndarray
@@ -47,13 +47,13 @@ def steps(array: ArrayRates) -> np.ndarray:
     return grid(array).step
 
 
-def grid(array: ArrayRates) -> Grid:
+def grid(array: ArrayRates) -> CountGrid:
     """The grids of the gyros' values. Made once for a recording.
 
     A gyro that gives one constant is taken to have the largest step of the others: its own cannot be seen.
     """
 
-    def find() -> Grid:
+    def find() -> CountGrid:
         own = (
             column if array.missing is None else np.where(array.missing[:, gyro], np.nan, column)
             for gyro, column in enumerate(array.rate.T)
@@ -62,12 +62,12 @@ def grid(array: ArrayRates) -> Grid:
         step, begin = (np.array(one, dtype=float) for one in zip(*found, strict=True))
         constant = np.isnan(step)
         step[constant] = step[~constant].max(initial=0.0)
-        return Grid(step, np.nan_to_num(begin))
+        return CountGrid(step, np.nan_to_num(begin))
 
     return array.once("grid", find)
 
 
-def with_grid(array: ArrayRates, known: Grid) -> ArrayRates:
+def with_grid(array: ArrayRates, known: CountGrid) -> ArrayRates:
     """The array with a grid that was seen before its values were corrected."""
     array.once("grid", lambda: known)
     return array
@@ -132,7 +132,7 @@ def noise_before(step: float, variance: float) -> float:
     return float(brentq(excess, 0.0, variance)) if excess(variance) > 0.0 and variance > 0.0 else 0.0
 
 
-def lasting_of_mean(known: Grid, variance: np.ndarray, means: np.ndarray, weights: np.ndarray) -> float:
+def lasting_of_mean(known: CountGrid, variance: np.ndarray, means: np.ndarray, weights: np.ndarray) -> float:
     """Variance, (deg/s)², of the rounding error of Σ u_i·y_i that stays while the rate does.
 
     means, weights [N] : of the gyros, deg/s;  variance [N] : of their samples, as rounded, (deg/s)²

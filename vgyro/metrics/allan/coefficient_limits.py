@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.metrics.allan.model import Curve, Model, fit, solve
+from vgyro.metrics.allan.model import AllanModel, VarianceCurve, fit, solve
 
 FIRST_STEP, MOST_STEPS = 0.01, 30  # relative, twice as long each time
 STEPS_OF_BISECTION = 4
@@ -24,7 +24,7 @@ class Drawing:
     replicates: int
     seed: int
 
-    def errors(self, model: Model, squares: np.ndarray, edf: np.ndarray) -> np.ndarray:
+    def errors(self, model: AllanModel, squares: np.ndarray, edf: np.ndarray) -> np.ndarray:
         """Allan variances over those expected [R, M]: chi² of each edf [M], joined by a Gaussian copula."""
         values, vectors = np.linalg.eigh(correlation_of(model, squares))
         root = vectors * np.sqrt(np.maximum(values, 0))
@@ -44,7 +44,7 @@ def _chi2_over_edf(normal: np.ndarray, edf: np.ndarray) -> np.ndarray:
     return ratio
 
 
-def correlation_of(model: Model, squares: np.ndarray) -> np.ndarray:
+def correlation_of(model: AllanModel, squares: np.ndarray) -> np.ndarray:
     """Correlation [M, M] of Allan variances at different τ: ∫ S²|H₁|²|H₂|² df, S the fitted two-sided spectrum.
 
     The covariance of two mean squares of stationary Gaussian series is 2/T times the integral of their squared
@@ -67,7 +67,7 @@ def correlation_of(model: Model, squares: np.ndarray) -> np.ndarray:
     return response @ response.T
 
 
-def chance_of_gain(model: Model, term: str, curve: Curve, drawing: Drawing) -> float:
+def chance_of_gain(model: AllanModel, term: str, curve: VarianceCurve, drawing: Drawing) -> float:
     """Probability that a term which is not there gains as much as it does: small values are evidence for it.
 
     The gain is the fall of the weighted sum of squares when `term` joins the model; its distribution without the term
@@ -76,7 +76,7 @@ def chance_of_gain(model: Model, term: str, curve: Curve, drawing: Drawing) -> f
     model more closely.  returns : (1 + draws that gain as much) / (1 + draws)
     """
     edf = 1 / (1 / curve.edf + TRUST**2 / 2)
-    squares = fit(model, Curve(curve.tau, curve.variance, edf))
+    squares = fit(model, VarianceCurve(curve.tau, curve.variance, edf))
     expected = model.at(squares, curve.variance)
     wide = model.with_terms(term)
     targets = np.vstack([curve.variance[None], drawing.errors(model, squares, edf) * expected])
@@ -95,8 +95,8 @@ class Limits:
     chance, the lower limit is 0.
     """
 
-    model: Model
-    curve: Curve
+    model: AllanModel
+    curve: VarianceCurve
     squares: np.ndarray
     errors: np.ndarray
     tail: float

@@ -9,7 +9,7 @@ import numpy as np
 
 from vgyro.metrics.allan.coefficient_limits import Drawing, Limits, chance_of_gain
 from vgyro.metrics.allan.deviation import AllanCurve
-from vgyro.metrics.allan.model import BASE, FREE, SHAPES, Curve, Model, fit, low_pass_factor
+from vgyro.metrics.allan.model import BASE, FREE, SHAPES, AllanModel, VarianceCurve, fit, low_pass_factor
 from vgyro.metrics.equal_bandwidth import LowPass
 
 __all__ = ["Coefficient", "NoiseCoefficients", "low_pass_factor", "model_deviation", "noise_coefficients"]
@@ -95,12 +95,12 @@ def noise_coefficients(
     if used.sum() < len(BASE):
         note = "fewer than 3 points of the Allan curve"
         return NoiseCoefficients(UNKNOWN, UNKNOWN, UNKNOWN, math.nan, math.nan, note)
-    whole = Curve(curve.tau[used], curve.deviation[used] ** 2, curve.edf[used])
+    whole = VarianceCurve(curve.tau[used], curve.deviation[used] ** 2, curve.edf[used])
     if not whole.variance.any():
         zero = Coefficient(0.0, 0.0, 0.0)
         return NoiseCoefficients(zero, zero, zero, float(whole.tau[0]), 0.0, "the series is constant", zero, zero)
     drawing = Drawing(replicates, seed)
-    model, first = _describe(Model(BASE, whole.tau, low_pass.constant, passes), whole, Drawing(DRAWS, seed))
+    model, first = _describe(AllanModel(BASE, whole.tau, low_pass.constant, passes), whole, Drawing(DRAWS, seed))
     fitted = whole.since(first)
     squares = fit(model, fitted)
     tail = (1 - (curve.confidence if confidence is None else confidence)) / 2
@@ -115,13 +115,13 @@ def noise_coefficients(
     return NoiseCoefficients(**result, tau_from=tau_from, misfit=misfit, note=note)
 
 
-def _describe(base: Model, curve: Curve, drawing: Drawing) -> tuple[Model, int]:
+def _describe(base: AllanModel, curve: VarianceCurve, drawing: Drawing) -> tuple[AllanModel, int]:
     """The model that describes the curve from the first τ, of that index, on."""
     model, first = _at_short_tau(base, curve, drawing)
     return (model.with_terms("R") if _shows(model, "R", curve.since(first), drawing) else model), first
 
 
-def _at_short_tau(base: Model, curve: Curve, drawing: Drawing) -> tuple[Model, int]:
+def _at_short_tau(base: AllanModel, curve: VarianceCurve, drawing: Drawing) -> tuple[AllanModel, int]:
     if base.constant or len(curve.tau) < FEWEST_POINTS:
         return base, 0
     first, free = _first_fitting(base, curve), base.with_terms(FREE)
@@ -137,7 +137,7 @@ def _at_short_tau(base: Model, curve: Curve, drawing: Drawing) -> tuple[Model, i
     return base.since(first), first
 
 
-def _shows(model: Model, term: str, curve: Curve, drawing: Drawing) -> bool:
+def _shows(model: AllanModel, term: str, curve: VarianceCurve, drawing: Drawing) -> bool:
     """Is a further term needed, and does the model with it describe the curve?"""
     if len(curve.tau) < FEWEST_POINTS or chance_of_gain(model, term, curve, drawing) > EVIDENCE:
         return False
@@ -145,12 +145,12 @@ def _shows(model: Model, term: str, curve: Curve, drawing: Drawing) -> bool:
     return _misfit(wide, fit(wide, curve), curve) <= LARGEST_MISFIT
 
 
-def _misfit(model: Model, squares: np.ndarray, curve: Curve) -> float:
+def _misfit(model: AllanModel, squares: np.ndarray, curve: VarianceCurve) -> float:
     expected = model.at(squares, curve.variance)
     return float(np.mean((curve.variance - expected) ** 2 * curve.edf / (2 * expected**2)))
 
 
-def _first_fitting(model: Model, curve: Curve) -> int:
+def _first_fitting(model: AllanModel, curve: VarianceCurve) -> int:
     """Index of the first τ that agrees with a fit to all longer τ, within 4 standard deviations or 1 % of variance."""
     last = min(len(curve.tau) - FEWEST_POINTS, int(np.searchsorted(curve.tau, curve.tau[-1] / 30)))
     for first in range(max(last, 0)):
@@ -162,7 +162,7 @@ def _first_fitting(model: Model, curve: Curve) -> int:
     return max(last, 0)
 
 
-def _largest_unseen(term: str, limits: Limits, highest: np.ndarray, whole: Curve, identified: bool) -> float:
+def _largest_unseen(term: str, limits: Limits, highest: np.ndarray, whole: VarianceCurve, identified: bool) -> float:
     """Upper limit of the square of a term that is not in the model.
 
     highest : array [M], upper limits of the variances of the whole curve, which the term alone cannot exceed
@@ -177,7 +177,7 @@ def _largest_unseen(term: str, limits: Limits, highest: np.ndarray, whole: Curve
     return min(wider.upper(term), room)
 
 
-def _note(model: Model, squares: np.ndarray, late: float | None, misfit: float) -> str:
+def _note(model: AllanModel, squares: np.ndarray, late: float | None, misfit: float) -> str:
     notes = [] if late is None else [f"fitted from τ = {late:.3g} s"]
     if FREE in model.terms:
         kind = "the gyro's own low-pass" if squares[-1] < 0 else "a tone or other noise of the angle"
@@ -197,7 +197,7 @@ def model_deviation(
 ) -> np.ndarray:
     """Allan deviation of the fitted model at `tau` s, in deg/s; terms that were not estimated are left out."""
     constant = LowPass(bandwidth_hz, passes=passes).constant
-    model = Model(BASE + "QR", np.asarray(tau, dtype=float), constant, passes)
+    model = AllanModel(BASE + "QR", np.asarray(tau, dtype=float), constant, passes)
     squares = np.array([getattr(coefficients, term).value ** 2 for term in model.terms])
     squares[len(BASE) :] = np.nan_to_num(squares[len(BASE) :])
     return np.sqrt(model.columns @ squares)

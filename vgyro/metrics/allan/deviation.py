@@ -41,7 +41,7 @@ class AllanCurve:
 
 
 @dataclass(frozen=True)
-class _Series:
+class _CurveSeries:
     """rate [T]; edges [S + 1] of its stretches, in samples; or in slots, where samples are lost: then sums of it."""
 
     rate: np.ndarray
@@ -121,18 +121,20 @@ def allan_deviation(
 
 def _series(
     rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: ModuleType, kind: str
-) -> _Series:
+) -> _CurveSeries:
     if sampling is None:
-        return _Series(rate, edges_of(len(rate), segment))
+        return _CurveSeries(rate, edges_of(len(rate), segment))
     if len(sampling) != len(rate):
         raise ValueError(f"{len(rate)} rates, but {len(sampling)} samples")
     if sampling.missing == 0 and kind != "robust":
-        return _Series(rate, edges_of(len(rate), sampling.stretch))
+        return _CurveSeries(rate, edges_of(len(rate), sampling.stretch))
     slot, edges = sampling.slots()
-    return _Series(rate, edges, SlotSums.of(rate, slot, edges, allan))
+    return _CurveSeries(rate, edges, SlotSums.of(rate, slot, edges, allan))
 
 
-def _variances(series: _Series, factors: np.ndarray, allan: ModuleType, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def _variances(
+    series: _CurveSeries, factors: np.ndarray, allan: ModuleType, kind: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Variance at each factor, and the share of the differences there are."""
     sums, share = series.sums, LONGEST[kind]
     if sums is None:
@@ -149,7 +151,7 @@ def _variances(series: _Series, factors: np.ndarray, allan: ModuleType, kind: st
 
 
 def _freedom(
-    series: _Series, factors: np.ndarray, exponent: np.ndarray, share: np.ndarray, allan: ModuleType, kind: str
+    series: _CurveSeries, factors: np.ndarray, exponent: np.ndarray, share: np.ndarray, allan: ModuleType, kind: str
 ) -> np.ndarray:
     """Degrees of freedom [M]: those of all stretches that are long enough, times the share of the differences."""
     lengths, alike = np.unique(np.diff(series.edges), return_counts=True)

@@ -50,20 +50,20 @@ def low_pass_factor(tau: np.ndarray, constant: float, passes: int = 1) -> np.nda
 
 
 @dataclass(frozen=True)
-class Curve:
+class VarianceCurve:
     """tau [M] s, Allan variance [M] (deg/s)² and its degrees of freedom [M]; what fits and limits are made from."""
 
     tau: np.ndarray
     variance: np.ndarray
     edf: np.ndarray
 
-    def since(self, first: int) -> Curve:
+    def since(self, first: int) -> VarianceCurve:
         """Without the first points."""
-        return Curve(self.tau[first:], self.variance[first:], self.edf[first:])
+        return VarianceCurve(self.tau[first:], self.variance[first:], self.edf[first:])
 
 
 @dataclass(frozen=True)
-class Model:
+class AllanModel:
     """Terms of the model at the τ [M] of a curve, and their columns [M, C].
 
     constant, passes : Tc of a known first-order low-pass, s, and how often the series went through it
@@ -86,14 +86,14 @@ class Model:
         """How many of the terms, from the first on, cannot be negative."""
         return len(self.terms.rstrip(FREE))
 
-    def with_terms(self, terms: str) -> Model:
+    def with_terms(self, terms: str) -> AllanModel:
         """The same with more terms, in the order of the module."""
         every = set(self.terms + terms)
-        return Model("".join(term for term in SHAPES if term in every), self.tau, self.constant, self.passes)
+        return AllanModel("".join(term for term in SHAPES if term in every), self.tau, self.constant, self.passes)
 
-    def since(self, first: int) -> Model:
+    def since(self, first: int) -> AllanModel:
         """Without the first τ."""
-        return Model(self.terms, self.tau[first:], self.constant, self.passes)
+        return AllanModel(self.terms, self.tau[first:], self.constant, self.passes)
 
     def at(self, squares: np.ndarray, variance: np.ndarray) -> np.ndarray:
         """Allan variance [M] of the model, never below a small part of `variance` [M]."""
@@ -101,8 +101,8 @@ class Model:
 
 
 def fit(
-    model: Model,
-    curve: Curve,
+    model: AllanModel,
+    curve: VarianceCurve,
     held: tuple[int, float] | None = None,
     start: np.ndarray | None = None,
     settled: float = SETTLED,

@@ -14,7 +14,7 @@ from vgyro.report.calibration.certificate_plots import certificate_plots
 from vgyro.report.html import definitions, heading, join, macro, paragraph, print_button
 from vgyro.report.model import DatasetPart, Record
 from vgyro.report.numbers import count, duration, percent, plain, significant
-from vgyro.report.tables import Cell, Column, Notes, Row, number_cell, render_table
+from vgyro.report.tables import Cell, Notes, TableColumn, TableRow, number_cell, render_table
 
 NAN = float("nan")
 GYROS_A_TABLE = 6  # as many as a sheet of paper holds side by side
@@ -112,14 +112,14 @@ def _table(dataset: DatasetPart, gyros: Mapping[str, Record], number: int) -> Ma
     """Figures as rows, gyros as columns."""
     notes = Notes()
     columns = [
-        Column("figure", numeric=False),
-        *(Column(name) for name in gyros),
-        Column("floor", hint=FLOOR_WORDS),
+        TableColumn("figure", numeric=False),
+        *(TableColumn(name) for name in gyros),
+        TableColumn("floor", hint=FLOOR_WORDS),
     ]
     rows = []
     for key, figure in MAIN:
         cells = [_main_cell(record, key, notes) for record in gyros.values()]
-        rows.append(Row((Cell(figure.title, figure.unit, hint=figure.meaning), *cells, Cell(""))))
+        rows.append(TableRow((Cell(figure.title, figure.unit, hint=figure.meaning), *cells, Cell(""))))
     for name in dict.fromkeys(name for record in gyros.values() for name in record.get("figures") or {}):
         found = [(record.get("figures") or {}).get(name) for record in gyros.values()]
         rows.append(_figure_row(name, found, dataset.calibration_figures.get(name), notes))
@@ -134,16 +134,16 @@ def _main_cell(record: Record, key: str, notes: Notes) -> Cell:
     return number_cell(value, low, high, notes=notes.number(note))
 
 
-def _figure_row(name: str, found: Sequence[Record | None], figure: Figure | None, notes: Notes) -> Row:
+def _figure_row(name: str, found: Sequence[Record | None], figure: Figure | None, notes: Notes) -> TableRow:
     unit = next((str(one["unit"]) for one in found if one), "")
     title, meaning = (figure.title, figure.meaning) if figure else (name.replace("_", " "), "")
     head = Cell(title, unit, hint=meaning)
     reasons = {str(one["note"]) for one in found if one and one["state"] == "not measured"}
     if len(reasons) == 1 and all(one is None or one["state"] == "not measured" for one in found):
-        return Row((head, Cell(f"not measured: {reasons.pop()}", tone="muted", span=len(found) + 1)))
+        return TableRow((head, Cell(f"not measured: {reasons.pop()}", tone="muted", span=len(found) + 1)))
     floors = [float(one["floor"]) for one in found if one and one["floor"] is not None]
     floor = _range((min(floors), max(floors))) if floors else ""
-    return Row((head, *(figure_cell(one, notes) for one in found), Cell(floor)))
+    return TableRow((head, *(figure_cell(one, notes) for one in found), Cell(floor)))
 
 
 def figure_cell(figure: Record | None, notes: Notes) -> Cell:

@@ -12,7 +12,7 @@ from vgyro.report.calibration.certificate import certificate
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import DatasetPart, Record
 from vgyro.report.numbers import MISSING, plain
-from vgyro.report.tables import Cell, Column, render_table
+from vgyro.report.tables import Cell, TableColumn, render_table
 
 FEW = 8
 NOMINAL_WORDS = (
@@ -25,18 +25,18 @@ LOGGED_WORDS = (
     "percent for most MEMS gyros)."
 )
 LOGGED_COLUMNS = (
-    Column("gyro", numeric=False),
-    Column("axis", numeric=False),
-    Column("column of the log", numeric=False),
-    Column("unit", numeric=False),
+    TableColumn("gyro", numeric=False),
+    TableColumn("axis", numeric=False),
+    TableColumn("column of the log", numeric=False),
+    TableColumn("unit", numeric=False),
 )
 COLUMNS = (
-    Column("gyro", numeric=False),
-    Column("axis", numeric=False),
-    Column("scale from", numeric=False),
-    Column("scale", "deg/s a count"),
-    Column("bias", "counts"),
-    Column("remark", numeric=False),
+    TableColumn("gyro", numeric=False),
+    TableColumn("axis", numeric=False),
+    TableColumn("scale from", numeric=False),
+    TableColumn("scale", "deg/s a count"),
+    TableColumn("bias", "counts"),
+    TableColumn("remark", numeric=False),
 )
 
 

@@ -43,7 +43,7 @@ RECOMMENDED: Name = ("recommended", "")
 
 
 @dataclass(frozen=True)
-class Best:
+class BestMethod:
     """Best method of an array by one improvement factor. figure : its name in metrics.parquet"""
 
     label: str
@@ -58,11 +58,11 @@ class Best:
         return self.name[0]
 
 
-def best_method(array: ArrayPart, figure: str, allowed: Callable[[Name], bool] = lambda _: True) -> Best | None:
+def best_method(array: ArrayPart, figure: str, allowed: Callable[[Name], bool] = lambda _: True) -> BestMethod | None:
     """The method, not in-sample, with the greatest improvement factor, of those that `allowed` lets pass."""
     seen = in_sample(array)
     found = [
-        Best(label, name, figure, array.values()[name][figure], array.axis, array.recording)
+        BestMethod(label, name, figure, array.values()[name][figure], array.axis, array.recording)
         for name, label in _labels(array).items()
         if name not in seen and allowed(name) and figure in _known(array, name)
         if not says_limited(array.values()[name][figure])
@@ -70,7 +70,7 @@ def best_method(array: ArrayPart, figure: str, allowed: Callable[[Name], bool] =
     return max(found, key=lambda best: best.factor.value, default=None)
 
 
-def best_of_all(array: ArrayPart) -> Best | None:
+def best_of_all(array: ArrayPart) -> BestMethod | None:
     """By 1σ at equal bandwidth, of the methods that hold at the added rate.
 
     Where bandwidths were not made equal: by 1σ, of those that do not narrow the bandwidth.

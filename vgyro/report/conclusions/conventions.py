@@ -10,7 +10,7 @@ from vgyro.figure import Figure
 from vgyro.report.html import definitions, details, join, paragraph
 from vgyro.report.model import DatasetPart, Record
 from vgyro.report.numbers import percent, plain
-from vgyro.report.tables import Cell, Column, render_table
+from vgyro.report.tables import Cell, TableColumn, render_table
 
 CONVENTIONS = (
     ("Allan model", "σ² = 3Q²/τ² + N²/τ + (2 ln2/π)B² + K²τ/3 + R²τ²/2, τ in s, rate in deg/s; overlapping estimator"),
@@ -81,7 +81,11 @@ def _chosen(options: Record) -> list[tuple[str, str]]:
 
 def _meanings(title: str, figures: Mapping[str, Figure]) -> Markup:
     rows = [[Cell(figure.title), Cell(figure.unit), Cell(figure.meaning)] for figure in figures.values()]
-    columns = [Column("figure", numeric=False), Column("unit", numeric=False), Column("meaning", numeric=False)]
+    columns = [
+        TableColumn("figure", numeric=False),
+        TableColumn("unit", numeric=False),
+        TableColumn("meaning", numeric=False),
+    ]
     return details(title, render_table(columns, rows)) if rows else Markup("")
 
 
@@ -105,15 +109,15 @@ def provenance_part(dataset: DatasetPart) -> Markup:
     parts: list[Markup | str] = [paragraph(words)]
     if files:
         columns = [
-            Column("recording", numeric=False),
-            Column("file", numeric=False),
-            Column("bytes"),
-            Column("SHA-256", numeric=False),
+            TableColumn("recording", numeric=False),
+            TableColumn("file", numeric=False),
+            TableColumn("bytes"),
+            TableColumn("SHA-256", numeric=False),
         ]
         parts.append(details("Data files", render_table(columns, files, compact=True)))
     if artefacts:
         names = ("artefact", "schema", "inputs", "options", "code")
-        columns = [Column(name, numeric=False) for name in names]
+        columns = [TableColumn(name, numeric=False) for name in names]
         parts.append(details("Artefacts", render_table(columns, artefacts, compact=True)))
     parts.append(details("Analysis options", definitions(_flat(dataset.options))))
     return join(*parts)

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import ArrayPart, rows_of
 from vgyro.report.numbers import MISSING, significant
-from vgyro.report.tables import Cell, Column, Row, render_table
+from vgyro.report.tables import Cell, TableColumn, TableRow, render_table
 
 CAPTION = "Sampled results, computed again by the other engine and by independent routes"
 WORDS = (
@@ -24,16 +24,16 @@ def crosscheck_part(array: ArrayPart) -> Markup:
     if table is None or not len(table["check"]):
         return paragraph("No cross-check was made.", "note")
     columns = [
-        Column("check", numeric=False),
-        Column("against", numeric=False),
-        Column("window"),
-        Column("series", numeric=False),
-        Column("ours"),
-        Column("theirs"),
-        Column("difference"),
-        Column("tolerance"),
-        Column("unit", numeric=False),
-        Column("", numeric=False),
+        TableColumn("check", numeric=False),
+        TableColumn("against", numeric=False),
+        TableColumn("window"),
+        TableColumn("series", numeric=False),
+        TableColumn("ours"),
+        TableColumn("theirs"),
+        TableColumn("difference"),
+        TableColumn("tolerance"),
+        TableColumn("unit", numeric=False),
+        TableColumn("", numeric=False),
     ]
     rows = [_row(row) for row in rows_of(table)]
     failed = failures(array)
@@ -54,7 +54,7 @@ def failures(array: ArrayPart) -> int:
     return 0 if table is None else int((~table["passed"].astype(bool)).sum())
 
 
-def _row(row: dict) -> Row:
+def _row(row: dict) -> TableRow:
     passed = bool(row["passed"])
     numbers = [
         Cell(significant(float(row[name]), digits))
@@ -68,4 +68,4 @@ def _row(row: dict) -> Row:
         verdict = Cell("FAILED: one side has no figure", tone="bad")
     unit = str(row["unit"]) or MISSING
     cells = (Cell(str(row["check"])), Cell(str(row["against"])), Cell(window), Cell(str(row["series"])), *numbers)
-    return Row((*cells, Cell(unit), verdict), tone="" if passed else "bad")
+    return TableRow((*cells, Cell(unit), verdict), tone="" if passed else "bad")

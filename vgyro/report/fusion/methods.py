@@ -14,7 +14,7 @@ from vgyro.report.figure_cells import BAND_LIMITED, figure_cell, figure_column, 
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import ArrayPart, DatasetPart, Record, Value, Values
 from vgyro.report.numbers import MISSING, count, significant
-from vgyro.report.tables import Cell, Column, Notes, Row, render_table
+from vgyro.report.tables import Cell, Notes, TableColumn, TableRow, render_table
 
 FAIR, RAW = "fair: free of the bandwidth", "raw, as the papers"
 SAMPLES, READ, WHITE, SLOW, ANGLE = (
@@ -85,14 +85,16 @@ NEEDS_HINT = (
 )
 METHOD, RESPONSE = "the method", "response of the method"
 PROPERTIES = (
-    Column("runs", numeric=False, hint="causal: sample t uses nothing later than t; offline: it does", group=METHOD),
-    Column("needs", numeric=False, hint=NEEDS_HINT, group=METHOD),
-    Column("cost", "op/sample", hint="operations a sample, all passes, counted from the equations", group=METHOD),
-    Column("delay", "s", hint="at low frequency", group=RESPONSE),
-    Column("DC gain", "1", hint="gain for a constant rate", group=RESPONSE),
-    Column("−3 dB bandwidth", "Hz", group=RESPONSE),
-    Column("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group=RESPONSE),
-    Column("known", numeric=False, hint="how the four are known", group=RESPONSE),
+    TableColumn(
+        "runs", numeric=False, hint="causal: sample t uses nothing later than t; offline: it does", group=METHOD
+    ),
+    TableColumn("needs", numeric=False, hint=NEEDS_HINT, group=METHOD),
+    TableColumn("cost", "op/sample", hint="operations a sample, all passes, counted from the equations", group=METHOD),
+    TableColumn("delay", "s", hint="at low frequency", group=RESPONSE),
+    TableColumn("DC gain", "1", hint="gain for a constant rate", group=RESPONSE),
+    TableColumn("−3 dB bandwidth", "Hz", group=RESPONSE),
+    TableColumn("noise bandwidth", "Hz", hint="noise-equivalent, one-sided", group=RESPONSE),
+    TableColumn("known", numeric=False, hint="how the four are known", group=RESPONSE),
 )
 # The recommended rows first: of some forty they are the ones to look for.
 FAMILIES = {
@@ -186,7 +188,7 @@ def _figures(
     notes = Notes()
     metrics = [(name, group) for name, group in groups if _known(values, name)]
     best = {name: _best(array, values, name) for name, _ in metrics}
-    columns = [Column("", numeric=False)]
+    columns = [TableColumn("", numeric=False)]
     columns += [figure_column(dataset.figures.get(name) or _unnamed(values, name), group) for name, group in metrics]
 
     def of_gyro(gyro: str) -> list[Cell]:
@@ -213,19 +215,19 @@ def _rows(
     of_method: MakeCells,
     width: int,
     notes: Notes | None = None,
-) -> list[Row]:
+) -> list[TableRow]:
     """Gyros and methods under their headings, by family; a method that did not run has one cell that says why.
 
     notes : takes the remarks on the methods, which one table of a recording gives
     """
     methods = array.methods()
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     if of_gyro is not None:
-        rows += [Row(heading="Single gyros"), *(Row((Cell(gyro), *of_gyro(gyro))) for gyro in array.gyros)]
+        rows += [TableRow(heading="Single gyros"), *(TableRow((Cell(gyro), *of_gyro(gyro))) for gyro in array.gyros)]
     for family, heading in FAMILIES.items():
         mine = [method for method in methods if method["family"] == family]
         mine.sort(key=lambda method: FIRST.get(str(method["method"]), len(FIRST)))
-        rows += [Row(heading=heading)] if mine else []
+        rows += [TableRow(heading=heading)] if mine else []
         rows += [_method_row(method, of_method, width, notes) for method in _together(mine)]
     return rows
 
@@ -237,7 +239,7 @@ def _together(methods: Sequence[Record]) -> Iterator[Record]:
         yield {**forms[0], "definition": ", ".join(form["definition"] for form in forms if form["definition"])}
 
 
-def _method_row(method: Mapping[str, Any], of_method: MakeCells, width: int, notes: Notes | None) -> Row:
+def _method_row(method: Mapping[str, Any], of_method: MakeCells, width: int, notes: Notes | None) -> TableRow:
     remarks: tuple[int, ...] = ()
     if notes is not None and method["inferred"]:
         remarks += notes.number(f"inferred: {method['inferred']}")
@@ -245,10 +247,10 @@ def _method_row(method: Mapping[str, Any], of_method: MakeCells, width: int, not
         remarks += notes.number(method["note"])
     first = Cell(method["title"], method["definition"], notes=remarks, hint=method["source"])
     if method["column"]:
-        return Row((first, *of_method(method)))
+        return TableRow((first, *of_method(method)))
     if method.get("state") == FAILED:
-        return Row((first, Cell(str(method["note"]), tone="bad", span=width)))
-    return Row((first, Cell(f"not run: {method['note']}", tone="muted", span=width)))
+        return TableRow((first, Cell(str(method["note"]), tone="bad", span=width)))
+    return TableRow((first, Cell(f"not run: {method['note']}", tone="muted", span=width)))
 
 
 def response_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
@@ -258,10 +260,10 @@ def response_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
     if not counted and not methods:
         return Markup("")
     properties = PROPERTIES if methods else ()
-    columns = [Column("", numeric=False)]
+    columns = [TableColumn("", numeric=False)]
     for name in counted:
         figure = dataset.figures.get(name) or _unnamed(values, name)
-        columns.append(Column(figure.title, "samples", hint=figure.meaning, group="data of the series"))
+        columns.append(TableColumn(figure.title, "samples", hint=figure.meaning, group="data of the series"))
     columns += properties
 
     def counts(series: tuple[str, str]) -> list[Cell]:

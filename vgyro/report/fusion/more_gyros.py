@@ -13,7 +13,7 @@ from vgyro.report.html import heading, join, paragraph
 from vgyro.report.model import ArrayPart, DatasetPart, Record, Table
 from vgyro.report.numbers import percent, plain, rounded, significant, with_interval
 from vgyro.report.plots import Axis, Curve, curve_plot
-from vgyro.report.tables import Cell, Column, Row, render_table
+from vgyro.report.tables import Cell, TableColumn, TableRow, render_table
 
 TITLE = "How many more gyros would help"
 RULE = (
@@ -124,9 +124,9 @@ def _wanted(summary: Record) -> Markup:
     if summary["correlation"] is None:
         return Markup("")
     wanted: list[list[Any]] = list(summary["wanted"])
-    columns = [Column("factor wanted", numeric=False), *(Column(plain(float(row[0]))) for row in wanted)]
+    columns = [TableColumn("factor wanted", numeric=False), *(TableColumn(plain(float(row[0]))) for row in wanted)]
     cells = [Cell("gyros"), *(_number_cell(*row[1:]) for row in wanted)]
-    return render_table(columns, [Row(tuple(cells))], "Gyros for a wanted factor over one of them", compact=True)
+    return render_table(columns, [TableRow(tuple(cells))], "Gyros for a wanted factor over one of them", compact=True)
 
 
 def _number_cell(value: int | None, low: int | None, high: int | None) -> Cell:

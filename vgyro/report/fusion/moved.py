@@ -12,7 +12,7 @@ from vgyro.report.figure_cells import figure_cell
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import MOVED_KINDS, ArrayPart, DatasetPart, Value, Values
 from vgyro.report.numbers import plain
-from vgyro.report.tables import Cell, Column, Notes, Row, render_table
+from vgyro.report.tables import Cell, Notes, TableColumn, TableRow, render_table
 
 MOVED_FIGURES = ("mean", "sigma", "arw", "bias_drift")
 MOST_OF_RATE = 0.1
@@ -38,14 +38,14 @@ def moved_table(dataset: DatasetPart, array: ArrayPart) -> Markup:
         return join(*unchanged)
     notes = Notes()
     names = [name for name in MOVED_FIGURES if any(name in known for known in moved.values())]
-    columns = [Column("", numeric=False)]
+    columns = [TableColumn("", numeric=False)]
     for name in names:
         figure = dataset.figures.get(name) or Figure(name, "", "")
         group = f"{figure.title}, {figure.unit}"
         heads = ("at rest", f"at {plain(rate)} deg/s")
-        columns += [Column(head, hint=figure.meaning, group=group) for head in heads]
+        columns += [TableColumn(head, hint=figure.meaning, group=group) for head in heads]
     rows = [
-        Row((
+        TableRow((
             Cell(method["title"], method["definition"], hint=method["source"]),
             *(cell for name in names for cell in _pair(still, moved, _key(method), name, rate, notes)),
         ))

@@ -14,7 +14,7 @@ from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import ArrayPart, Record, Table, rows_of
 from vgyro.report.numbers import probability, significant
 from vgyro.report.plots import Axis, Curve, curve_plot
-from vgyro.report.tables import Cell, Column, number_cell, render_table
+from vgyro.report.tables import Cell, TableColumn, number_cell, render_table
 
 # What a first look needs; the rest is one click away.
 SHOWN = ("average", "inverse_variance_arw", "dcc_causal", "recommended_unsmoothed", "recommended")
@@ -23,11 +23,11 @@ OVERLAPPING = "overlapping"
 MOST_MARKED, FEW_TONES, MOST_LISTED = 12, 12, 60
 PAIRS_SHOWN, MOST_PAIRS = 3, 30
 TONE_COLUMNS = (
-    Column("frequency", "Hz"),
-    Column("gyro", numeric=False),
-    Column("amplitude", "deg/s"),
-    Column("by chance", hint="chance that noise makes one such line anywhere in the spectrum"),
-    Column("also in", numeric=False),
+    TableColumn("frequency", "Hz"),
+    TableColumn("gyro", numeric=False),
+    TableColumn("amplitude", "deg/s"),
+    TableColumn("by chance", hint="chance that noise makes one such line anywhere in the spectrum"),
+    TableColumn("also in", numeric=False),
 )
 TONE_WORDS = (
     "A line may be an alias of a faster vibration. One that several gyros share comes from outside them (mounting, "

@@ -11,25 +11,29 @@ from markupsafe import Markup
 from vgyro.report.html import details
 from vgyro.report.model import RecordingPart
 from vgyro.report.numbers import MISSING, plain, significant, with_interval
-from vgyro.report.tables import Cell, Column, Notes, render_table
+from vgyro.report.tables import Cell, Notes, TableColumn, render_table
 
 COLUMNS = (
-    Column("stream", numeric=False),
-    Column("stamps", numeric=False, hint="sampled: the sensor's time; arrival: the receiver's; none: by the rate"),
-    Column("rate", "Hz", hint="± one standard deviation"),
-    Column("drift", "ppm", hint="largest less smallest rate of eight parts of the recording"),
-    Column("jitter", "ms", hint="r.m.s. distance of the stamps from even ones"),
-    Column("unevenness", "%", hint="standard deviation of the steps over their mean, where the samples are not even"),
-    Column("wraps"),
-    Column("restarts"),
-    Column("repeated", hint="rows dropped, for stamp and values are those of the row before"),
-    Column("rows a reading", hint="above 1: the logger was faster than the sensor; each reading is kept once"),
+    TableColumn("stream", numeric=False),
+    TableColumn("stamps", numeric=False, hint="sampled: the sensor's time; arrival: the receiver's; none: by the rate"),
+    TableColumn("rate", "Hz", hint="± one standard deviation"),
+    TableColumn("drift", "ppm", hint="largest less smallest rate of eight parts of the recording"),
+    TableColumn("jitter", "ms", hint="r.m.s. distance of the stamps from even ones"),
+    TableColumn(
+        "unevenness", "%", hint="standard deviation of the steps over their mean, where the samples are not even"
+    ),
+    TableColumn("wraps"),
+    TableColumn("restarts"),
+    TableColumn("repeated", hint="rows dropped, for stamp and values are those of the row before"),
+    TableColumn("rows a reading", hint="above 1: the logger was faster than the sensor; each reading is kept once"),
 )
 ALIGNED = (
-    Column("offset", "s", group="against the first", hint="of its first sample; 95 % interval below"),
-    Column("drift", "ppm", group="against the first", hint="95 % interval below"),
-    Column("by", numeric=False, group="against the first"),
-    Column("noise left", group="against the first", hint="share of the variance of white noise after interpolation"),
+    TableColumn("offset", "s", group="against the first", hint="of its first sample; 95 % interval below"),
+    TableColumn("drift", "ppm", group="against the first", hint="95 % interval below"),
+    TableColumn("by", numeric=False, group="against the first"),
+    TableColumn(
+        "noise left", group="against the first", hint="share of the variance of white noise after interpolation"
+    ),
 )
 
 

@@ -9,13 +9,13 @@ from markupsafe import Markup
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import ArrayPart, RecordingPart
 from vgyro.report.numbers import duration, plain
-from vgyro.report.tables import Cell, Column, Row, number_cell, render_table
+from vgyro.report.tables import Cell, TableColumn, TableRow, number_cell, render_table
 
 COLUMNS = (
-    Column("gyro", numeric=False),
-    Column("delay", "ms", hint="positive: later than the others; 95 % interval below"),
-    Column("taken out", numeric=False),
-    Column("noise left", hint="share of the variance of white noise that the interpolation leaves"),
+    TableColumn("gyro", numeric=False),
+    TableColumn("delay", "ms", hint="positive: later than the others; 95 % interval below"),
+    TableColumn("taken out", numeric=False),
+    TableColumn("noise left", hint="share of the variance of white noise that the interpolation leaves"),
 )
 FOUND = "found"
 
@@ -27,7 +27,7 @@ def delays_part(recording: RecordingPart, array: ArrayPart) -> Markup:
     found = recording.rates.delays[array.axis]
     if found["status"] != FOUND:
         return paragraph(f"Delays between the gyros are not known: {found['status']}.", "note")
-    rows = [Row(_cells(name, entry)) for name, entry in found["gyros"].items()]
+    rows = [TableRow(_cells(name, entry)) for name, entry in found["gyros"].items()]
     late = [name for name, entry in found["gyros"].items() if entry["removed"]]
     table = render_table(COLUMNS, rows, f"from {duration(float(found['moving_s']))} of motion", compact=True)
     title = f"Delays between the gyros: {', '.join(late)} late, taken out" if late else "Delays between the gyros: none"

@@ -13,7 +13,7 @@ from vgyro.report.html import heading, join, paragraph
 from vgyro.report.model import ArrayPart, DatasetPart, Record, rows_of
 from vgyro.report.numbers import plain, significant
 from vgyro.report.sentences import MOST_NAMED, Conclusion, named
-from vgyro.report.tables import Cell, Column, Row, render_table
+from vgyro.report.tables import Cell, TableColumn, TableRow, render_table
 
 LONG_SHARE = 0.1
 MOST_ROWS = 100
@@ -36,13 +36,13 @@ def faults_part(dataset: DatasetPart, array: ArrayPart) -> Markup:
         text = words if about.get("note") else f"No fault found. {words}"
         return join(heading("Faults", 4), paragraph(text, "note" if about.get("note") else ""))
     columns = [
-        Column("gyro", numeric=False),
-        Column("kind", numeric=False),
-        Column("from", "s"),
-        Column("to", "s"),
-        Column("evidence", "σ", hint="size over its standard error in health"),
-        Column("size", hint="greatest drift, step, ratio of the noise, change of the scale factor"),
-        Column("", numeric=False, wide=True),
+        TableColumn("gyro", numeric=False),
+        TableColumn("kind", numeric=False),
+        TableColumn("from", "s"),
+        TableColumn("to", "s"),
+        TableColumn("evidence", "σ", hint="size over its standard error in health"),
+        TableColumn("size", hint="greatest drift, step, ratio of the noise, change of the scale factor"),
+        TableColumn("", numeric=False, wide=True),
     ]
     rows = [_row(row) for row in found[:MOST_ROWS]]
     more = [f"{len(found) - MOST_ROWS} more events are in faults.parquet"] if len(found) > MOST_ROWS else []
@@ -130,9 +130,9 @@ def _searched(about: Record) -> str:
     return f"Looked for: {about.get('looked_for')}; evidence of {plain(float(threshold or 0), 3)} σ or more."
 
 
-def _row(row: dict[str, Any]) -> Row:
+def _row(row: dict[str, Any]) -> TableRow:
     evidence, size = float(row["evidence"]), float(row["size"])
-    return Row((
+    return TableRow((
         Cell(row["gyro"]),
         Cell(row["kind"]),
         Cell(plain(float(row["start"]), 7)),

@@ -12,24 +12,24 @@ from vgyro.report.model import DatasetPart, RecordingPart
 from vgyro.report.numbers import MISSING, count, duration, percent, plain
 from vgyro.report.recordings.clocks import clocks_part
 from vgyro.report.sentences import moved_words
-from vgyro.report.tables import Cell, Column, Row, Tone, render_table
+from vgyro.report.tables import Cell, TableColumn, TableRow, Tone, render_table
 
 MOST_LISTED = 50
 MOST_NAMED = 3
 STUCK_S = 1.0
 TONES: dict[str, Tone] = {"good": "good", "suspect": "warn", "refused": "bad"}
 COLUMNS = (
-    Column("recording", numeric=False),
-    Column("kind", numeric=False),
-    Column("status", numeric=False),
-    Column("duration"),
-    Column("good", group="frames", hint="frames whose checksum and counter are right"),
-    Column("bad", group="frames", hint="damaged frames, left out"),
-    Column("lost", group="frames", hint="missing by the frame counter"),
-    Column("gaps", hint="interruptions; nothing is put in their place"),
-    Column("declared", "Hz", group="sample rate"),
-    Column("measured", "Hz", group="sample rate"),
-    Column("clipped, stuck or missing channels", numeric=False),
+    TableColumn("recording", numeric=False),
+    TableColumn("kind", numeric=False),
+    TableColumn("status", numeric=False),
+    TableColumn("duration"),
+    TableColumn("good", group="frames", hint="frames whose checksum and counter are right"),
+    TableColumn("bad", group="frames", hint="damaged frames, left out"),
+    TableColumn("lost", group="frames", hint="missing by the frame counter"),
+    TableColumn("gaps", hint="interruptions; nothing is put in their place"),
+    TableColumn("declared", "Hz", group="sample rate"),
+    TableColumn("measured", "Hz", group="sample rate"),
+    TableColumn("clipped, stuck or missing channels", numeric=False),
 )
 
 
@@ -41,7 +41,7 @@ def recordings_part(dataset: DatasetPart) -> Markup:
     return join(table, *remarks, *map(clocks_part, dataset.recordings), *map(_detail, dataset.recordings))
 
 
-def _row(recording: RecordingPart, longest: float) -> Row:
+def _row(recording: RecordingPart, longest: float) -> TableRow:
     record = recording.integrity
     status = recording.status
     frames = record["frames"]
@@ -58,7 +58,7 @@ def _row(recording: RecordingPart, longest: float) -> Row:
         Cell(MISSING if measured is None else plain(float(measured)), hint=str(record["rate_note"])),
         Cell(channel_words(record["channels"], longest)),
     )
-    return Row(cells)
+    return TableRow(cells)
 
 
 def _longest_gap(gaps: list[Mapping[str, Any]]) -> str:
@@ -120,9 +120,9 @@ def _detail(recording: RecordingPart) -> Markup:
     return details(f"Damage and gaps of {recording.name}", join(*parts))
 
 
-def _detail_column(name: str, example: Any) -> Column:
+def _detail_column(name: str, example: Any) -> TableColumn:
     unit = {"time": "s", "duration": "s", "start": "byte", "stop": "byte"}.get(name, "")
-    return Column(name.replace("_", " "), unit, numeric=not isinstance(example, str | bool))
+    return TableColumn(name.replace("_", " "), unit, numeric=not isinstance(example, str | bool))
 
 
 def _plain(value: Any) -> str:

@@ -11,7 +11,7 @@ from vgyro.report.model import ArrayPart, RecordingPart, Table, rows_of
 from vgyro.report.numbers import duration, rounded
 from vgyro.report.plots import Axis, Curve, curve_plot
 from vgyro.report.recordings.faults import fault_times
-from vgyro.report.tables import Cell, Column, render_table
+from vgyro.report.tables import Cell, TableColumn, render_table
 
 TIME = Axis("time, s")
 RATE = Axis("rate, deg/s")
@@ -75,7 +75,7 @@ def correlation_table(recording: RecordingPart, array: ArrayPart) -> Markup:
     if table is None or len(array.gyros) < 2:
         return paragraph("One gyro: there is no correlation matrix.", "note")
     found = {(row["gyro"], row["other"]): row for row in rows_of(table)}
-    columns = [Column("", numeric=False), *(Column(name) for name in array.gyros)]
+    columns = [TableColumn("", numeric=False), *(TableColumn(name) for name in array.gyros)]
     rows = [
         [Cell(name), *(_correlation_cell(found.get((name, other)), name == other) for other in array.gyros)]
         for name in array.gyros

@@ -5,7 +5,7 @@ from __future__ import annotations
 from markupsafe import Markup
 
 from vgyro.report.model import ArrayPart, rows_of
-from vgyro.report.tables import Cell, Column, Tone, render_table
+from vgyro.report.tables import Cell, TableColumn, Tone, render_table
 
 # First word of each part of a verdict → tone; any other first word says why there is none.
 TONES: dict[str, Tone] = {
@@ -23,7 +23,11 @@ ARCH_RULE = (
     "short disturbances still rejects; else it is called what makes the test reject. The levels of the tests are such "
     "that white noise gets any verdict but “nothing” in less than 5 % of cases."
 )
-COLUMNS = (Column("gyro", numeric=False), Column("verdict", numeric=False), Column("why", numeric=False, wide=True))
+COLUMNS = (
+    TableColumn("gyro", numeric=False),
+    TableColumn("verdict", numeric=False),
+    TableColumn("why", numeric=False, wide=True),
+)
 
 
 def verdicts(array: ArrayPart) -> dict[str, list[str]]:

@@ -11,22 +11,22 @@ from markupsafe import Markup
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import ArrayPart, Table
 from vgyro.report.numbers import MISSING, count, significant
-from vgyro.report.tables import Cell, Column, Row, render_table
+from vgyro.report.tables import Cell, TableColumn, TableRow, render_table
 
 TITLES = {"ccc": "CCC", "dcc": "DCC", "bekk_scalar": "BEKK, scalar", "bekk_diagonal": "BEKK, diagonal"}
 OURS = "dcc"
 CAPTION = "DCC against its alternatives on a random sample of windows"
 BY_BIC, BY_WEIGHTS = "fit to the window", "weights carried on over the next step"
 COLUMNS = (
-    Column("", numeric=False),
-    Column("windows", hint="of the sample, in which all four models could be compared"),
-    Column("parameters"),
-    Column("Δ log-likelihood", hint="median of the windows, less that of DCC", group=BY_BIC),
-    Column("Δ BIC", hint="median of the windows, less that of DCC; less is better", group=BY_BIC),
-    Column("least BIC", hint="windows in which it has the least BIC of the four", group=BY_BIC),
-    Column("1σ", "deg/s", hint="r.m.s. of the fused r_t over the step after the window", group=BY_WEIGHTS),
-    Column("1σ / DCC", hint="geometric mean over the windows, least and greatest", group=BY_WEIGHTS),
-    Column("less than DCC", hint="windows in which its 1σ is less than that of DCC", group=BY_WEIGHTS),
+    TableColumn("", numeric=False),
+    TableColumn("windows", hint="of the sample, in which all four models could be compared"),
+    TableColumn("parameters"),
+    TableColumn("Δ log-likelihood", hint="median of the windows, less that of DCC", group=BY_BIC),
+    TableColumn("Δ BIC", hint="median of the windows, less that of DCC; less is better", group=BY_BIC),
+    TableColumn("least BIC", hint="windows in which it has the least BIC of the four", group=BY_BIC),
+    TableColumn("1σ", "deg/s", hint="r.m.s. of the fused r_t over the step after the window", group=BY_WEIGHTS),
+    TableColumn("1σ / DCC", hint="geometric mean over the windows, least and greatest", group=BY_WEIGHTS),
+    TableColumn("less than DCC", hint="windows in which its 1σ is less than that of DCC", group=BY_WEIGHTS),
 )
 WORDS = (
     "Δ: median of the windows, less that of DCC. BEKK(1,1): H_t = CC' + A r r'A + B H B with A and B multiples of the "
@@ -39,7 +39,7 @@ MOST_WINDOWS = 0.75
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedFits:
     """One model over W windows: log-likelihood, BIC and 1σ, each [W], DCC's own beside them; least [W] of BIC."""
 
     model: str
@@ -77,15 +77,18 @@ def bekk_part(array: ArrayPart) -> Markup:
     table = array.tables.get("bekk")
     if table is None or not len(table["model"]):
         return Markup("")
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for definition in dict.fromkeys(table["definition"].tolist()):
         found = compare(table, table["definition"] == definition)
-        rows += [Row(heading=f"definition “{definition}”"), *(Row(_cells(one)) for one in found if one.parameters)]
+        rows += [
+            TableRow(heading=f"definition “{definition}”"),
+            *(TableRow(_cells(one)) for one in found if one.parameters),
+        ]
     rendered = render_table(COLUMNS, rows, CAPTION, compact=True)
     return join(rendered, paragraph(sentence(compare(table))), paragraph(WORDS, "note"))
 
 
-def compare(table: Table, rows: np.ndarray | None = None) -> list[Compared]:
+def compare(table: Table, rows: np.ndarray | None = None) -> list[ComparedFits]:
     """The models of bekk.parquet, of some of its rows, over the windows in which all four have a BIC."""
     chosen = np.ones(len(table["model"]), dtype=bool) if rows is None else rows
     of = {model: chosen & (table["model"] == model) for model in TITLES}
@@ -100,7 +103,7 @@ def compare(table: Table, rows: np.ndarray | None = None) -> list[Compared]:
         return column(model, name) - column(OURS, name)
 
     return [
-        Compared(
+        ComparedFits(
             model, int(column(model, "parameters").max(initial=0)), more(model, "log_likelihood"), more(model, "bic"),
             column(model, "sigma"), column(OURS, "sigma"), least == place,
         )
@@ -108,7 +111,7 @@ def compare(table: Table, rows: np.ndarray | None = None) -> list[Compared]:
     ]  # fmt: skip
 
 
-def sentence(found: Sequence[Compared]) -> str:
+def sentence(found: Sequence[ComparedFits]) -> str:
     """Which has the least BIC in how many windows, and whether an alternative weighs better than DCC."""
     windows = len(found[0].least)
     if not windows:
@@ -130,7 +133,7 @@ def sentence(found: Sequence[Compared]) -> str:
     )
 
 
-def _cells(one: Compared) -> tuple[Cell, ...]:
+def _cells(one: ComparedFits) -> tuple[Cell, ...]:
     ratio = one.ratio
     own = one.model == OURS
     limits = f"{significant(ratio.min())} … {significant(ratio.max())}" if len(ratio) and not own else ""

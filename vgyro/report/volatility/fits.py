@@ -12,7 +12,7 @@ from vgyro.report.html import definitions, join, paragraph
 from vgyro.report.model import Table
 from vgyro.report.numbers import MISSING, count, percent
 from vgyro.report.plots import Axis, Bars, bar_plot
-from vgyro.report.tables import Cell, Column, render_table
+from vgyro.report.tables import Cell, TableColumn, render_table
 
 DCC = "dcc"
 CONVERGED = "converged"
@@ -95,7 +95,11 @@ def _stacked(table: Table, row: np.ndarray, windows: np.ndarray) -> tuple[np.nda
 
 
 def _counts(subjects: Sequence[str], statuses: Sequence[str], table: Table) -> Markup:
-    columns = [Column("fits of", numeric=False), Column("windows"), *(Column(status) for status in statuses)]
+    columns = [
+        TableColumn("fits of", numeric=False),
+        TableColumn("windows"),
+        *(TableColumn(status) for status in statuses),
+    ]
     rows = []
     for name in subjects:
         found = status_counts(table, name)

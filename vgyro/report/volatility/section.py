@@ -11,7 +11,7 @@ from vgyro.report.html import details, heading, join, paragraph
 from vgyro.report.model import ArrayPart, DccSummary, GarchSummary, Record, Table, VolatilityPart, WeightCurves, rows_of
 from vgyro.report.numbers import MISSING, count, percent, probability, significant
 from vgyro.report.plots import Axis, Curve, curve_plot
-from vgyro.report.tables import Cell, Column, Row, render_table
+from vgyro.report.tables import Cell, TableColumn, TableRow, render_table
 from vgyro.report.volatility.arch import effects_table
 from vgyro.report.volatility.bekk import bekk_part
 from vgyro.report.volatility.fits import fits_map, shares
@@ -47,17 +47,17 @@ def volatility_part(array: ArrayPart) -> Markup:
 
 
 def _arch_lm(array: ArrayPart) -> Markup:
-    columns = [Column("gyro", numeric=False), Column("samples")]
+    columns = [TableColumn("gyro", numeric=False), TableColumn("samples")]
     for series in SERIES:
         columns += [
-            Column("LM", hint="Engle's statistic, chi² with as many degrees of freedom as lags", group=series),
-            Column("p", group=series),
-            Column("kurtosis", group=series),
+            TableColumn("LM", hint="Engle's statistic, chi² with as many degrees of freedom as lags", group=series),
+            TableColumn("p", group=series),
+            TableColumn("kurtosis", group=series),
         ]
-    rows: list[Row | list[Cell]] = []
+    rows: list[TableRow | list[Cell]] = []
     for definition, part in array.volatility.items():
         if part.arch_lm is not None:
-            rows.append(Row(heading=MEANING.get(definition, definition)))
+            rows.append(TableRow(heading=MEANING.get(definition, definition)))
             rows += _arch_rows(part.arch_lm)
     caption = "ARCH-LM test (Engle 1982) of the longest gap-free stretch at rest; rejections at 5 % are bold"
     return join(render_table(columns, rows, caption, compact=True), paragraph(ARCH_WORDS, "note"))
@@ -101,14 +101,14 @@ def _definition_part(array: ArrayPart, definition: str, part: VolatilityPart) ->
 
 def _garch(summaries: Sequence[GarchSummary]) -> Markup:
     columns = [
-        Column("gyro", numeric=False),
-        Column("windows", group="rolling windows"),
-        Column("median α", group="rolling windows"),
-        Column("median β", group="rolling windows"),
-        Column("ω", "(deg/s)²", group="whole record"),
-        Column("α", group="whole record"),
-        Column("β", group="whole record"),
-        Column("status", numeric=False, group="whole record"),
+        TableColumn("gyro", numeric=False),
+        TableColumn("windows", group="rolling windows"),
+        TableColumn("median α", group="rolling windows"),
+        TableColumn("median β", group="rolling windows"),
+        TableColumn("ω", "(deg/s)²", group="whole record"),
+        TableColumn("α", group="whole record"),
+        TableColumn("β", group="whole record"),
+        TableColumn("status", numeric=False, group="whole record"),
     ]
     rows = [
         [
@@ -155,13 +155,13 @@ def _dcc(anchor: str, summary: DccSummary) -> Markup:
 
 def _dcc_table(summary: DccSummary) -> Markup:
     columns = [
-        Column("fitted to", numeric=False),
-        Column("a"),
-        Column("b"),
-        Column("χ²", hint="statistic of the test of constant correlation", group="constant correlation"),
-        Column("p, χ²(s + 1)", group="constant correlation"),
-        Column("p, χ²(s)", group="constant correlation"),
-        Column("status", numeric=False),
+        TableColumn("fitted to", numeric=False),
+        TableColumn("a"),
+        TableColumn("b"),
+        TableColumn("χ²", hint="statistic of the test of constant correlation", group="constant correlation"),
+        TableColumn("p, χ²(s + 1)", group="constant correlation"),
+        TableColumn("p, χ²(s)", group="constant correlation"),
+        TableColumn("status", numeric=False),
     ]
     rows: list[list[Cell]] = []
     if summary.windows:

@@ -10,11 +10,11 @@ from vgyro.board import BinaryFrame, Board
 from vgyro.simulate.recording import LINE, Simulated, Streams, rows_of
 from vgyro.simulate.rows import row_at
 from vgyro.simulate.serial.encode import Encoded, encode
-from vgyro.simulate.serial.line import Damage, Line
+from vgyro.simulate.serial.line import DamageDone, Line
 from vgyro.simulate.twin import Twin, line_of
 
 
-def dump_of(simulated: Simulated, board: Board, twin: Twin, seed: int | None = None) -> tuple[bytes, list[Damage]]:
+def dump_of(simulated: Simulated, board: Board, twin: Twin, seed: int | None = None) -> tuple[bytes, list[DamageDone]]:
     """The bytes of a whole recording that reach the disk, and what the line did to them.
 
     seed : instead of the twin's; the one given to simulate_recording
@@ -48,10 +48,10 @@ class Dump:
         generator = Streams(twin.seed if seed is None else seed, recording).of(LINE)
         self._line = Line(spec, total, begin, generator)
         self._sent = self._last_start = 0
-        self._left_out: list[Damage] = []
+        self._left_out: list[DamageDone] = []
 
     @property
-    def damage(self) -> list[Damage]:
+    def damage(self) -> list[DamageDone]:
         """What the line did so far, by offset."""
         return sorted([*self._line.done, *self._left_out], key=lambda item: item.offset)
 
@@ -63,7 +63,7 @@ class Dump:
             if piece.first <= first < piece.first + piece.time.size:
                 place = int(np.searchsorted(rows, first)) - 1
                 before = int(starts[place]) if place >= 0 else self._last_start
-                self._left_out.append(Damage("missing", before, first, f"{stop - first} frames"))
+                self._left_out.append(DamageDone("missing", before, first, f"{stop - first} frames"))
         if not rows.size:
             return b""
         self._sent, self._last_start = self._sent + len(encoded.data), int(starts[-1])

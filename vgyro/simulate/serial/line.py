@@ -13,7 +13,7 @@ LARGEST_PIECE = 4
 
 
 @dataclass(frozen=True)
-class Damage:
+class DamageDone:
     """One thing done: `offset` in the undamaged stream, `frame` there (row of the recording), `detail` in bytes."""
 
     kind: str
@@ -36,7 +36,7 @@ class Line:
     """
 
     def __init__(self, spec: LineDamage, total: int, begin: int, generator: np.random.Generator) -> None:
-        self.done: list[Damage] = []
+        self.done: list[DamageDone] = []
         self._generator = generator
         self._garbage = generator.bytes(spec.leading_bytes) if spec.leading_bytes else b""
         self._total, self._end = total, total - spec.cut_tail
@@ -52,7 +52,7 @@ class Line:
         out: list[bytes] = []
         if self._garbage:
             out.append(self._garbage)
-            self.done.append(Damage("leading", 0, int(frames[0]), self._garbage.hex()))
+            self.done.append(DamageDone("leading", 0, int(frames[0]), self._garbage.hex()))
             self._garbage = b""
         base, held, place = self._base, self._held + data, self._base
         self._starts = np.concatenate([self._starts, starts])
@@ -64,14 +64,14 @@ class Line:
         while self._places and self._places[-1][0] < stop:
             offset, kind = self._places.pop()
             old, new = _change(kind, held[offset - base : offset - base + LARGEST_PIECE], self._generator)
-            self.done.append(Damage(kind, offset, self._frame(offset), f"{old.hex()}>{new.hex()}"))
+            self.done.append(DamageDone(kind, offset, self._frame(offset), f"{old.hex()}>{new.hex()}"))
             out += [held[place - base : offset - base], new]
             place = offset + len(old)
         stop = max(place, min(stop, self._end))
         out.append(held[place - base : stop - base])
         self._held, self._base = held[stop - base :], stop
         if last and self._held:
-            self.done.append(Damage("cut_tail", stop, int(self._frames[-1]), self._held.hex()))
+            self.done.append(DamageDone("cut_tail", stop, int(self._frames[-1]), self._held.hex()))
         kept = max(int(np.searchsorted(self._starts, stop, side="right")) - 1, 0)
         self._starts, self._frames = self._starts[kept:], self._frames[kept:]
         return b"".join(out)
@@ -86,7 +86,7 @@ def damage(
     generator: np.random.Generator,
     starts: np.ndarray,
     frames: np.ndarray | None = None,
-) -> tuple[bytes, list[Damage]]:
+) -> tuple[bytes, list[DamageDone]]:
     """Send a whole stream through a `Line`.
 
     starts : [T] offset of each frame in `data`;  frames : [T] their numbers in the recording (None: 0, 1, …)

@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro.errors import DataError
 from vgyro.storage.clocks.head import Rules
-from vgyro.storage.clocks.lines import Line
+from vgyro.storage.clocks.lines import ClockLine
 from vgyro.storage.clocks.model import ClockRecord, Placed
 from vgyro.storage.clocks.repeats import Keeper
 from vgyro.storage.clocks.stream import BadRuns, as_stamps
@@ -31,7 +31,7 @@ class Track:
     starts: np.ndarray
     counters: np.ndarray
     times: np.ndarray
-    lines: list[Line]
+    lines: list[ClockLine]
     spikes: np.ndarray
     bad: BadRuns
 

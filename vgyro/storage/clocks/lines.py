@@ -56,7 +56,7 @@ def _summary(rows: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Line:
+class ClockLine:
     """Sampling time of a piece, s: period · c + a bent line through knots; c is the sample's number in the piece."""
 
     period: float
@@ -70,16 +70,16 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Fit:
+class StampFit:
     """period: s; period_sd: its uncertainty; drift: largest less smallest period of eight parts, relative; or None."""
 
     period: float
     period_sd: float
     drift: float | None
-    lines: list[Line]
+    lines: list[ClockLine]
 
 
-def fit_lines(pieces: list[np.ndarray], last: list[int], period: float, lowest: bool) -> Fit:
+def fit_lines(pieces: list[np.ndarray], last: list[int], period: float, lowest: bool) -> StampFit:
     """One line a piece; all have one slope where they are short.
 
     Bins that lie above the line by more than three sigma (stalls) are left out of an envelope.
@@ -103,7 +103,7 @@ def fit_lines(pieces: list[np.ndarray], last: list[int], period: float, lowest: 
     longest = max(range(len(points)), key=lambda piece: len(points[piece][0]))
     x, y = points[longest]
     drift = _drift(x[used[longest]], y[used[longest]], period)
-    return Fit(period + slope, slope_sd, drift, lines)
+    return StampFit(period + slope, slope_sd, drift, lines)
 
 
 def _pooled(
@@ -142,10 +142,10 @@ def _without_stalls(points: list[tuple[np.ndarray, np.ndarray]], slope: float) -
     return used
 
 
-def _line(x: np.ndarray, y: np.ndarray, weight: np.ndarray, slope: float, period: float, end: int) -> Line:
+def _line(x: np.ndarray, y: np.ndarray, weight: np.ndarray, slope: float, period: float, end: int) -> ClockLine:
     edge = np.array([0.0, max(1.0, float(end))])
     if not len(x):
-        return Line(period, edge, slope * edge)
+        return ClockLine(period, edge, slope * edge)
     if len(x) >= MIN_OWN_BINS:
         own = _pooled([(x, y)], [weight], [np.ones(len(x), dtype=bool)])[0]
         # Stamps of no sense: the slope of all pieces is the safer one.
@@ -160,8 +160,8 @@ def _line(x: np.ndarray, y: np.ndarray, weight: np.ndarray, slope: float, period
             gentle = np.abs(np.diff(values)) < MOST_OFF * (period + slope) * np.diff(knots)
             if scatter > BEND * rest + 1e-24 and gentle.all():
                 best, scatter = _to_edges(knots, values, edge), rest
-        return Line(period, best[0], best[1] + slope * best[0] + offset)
-    return Line(period, edge, slope * edge + offset)
+        return ClockLine(period, best[0], best[1] + slope * best[0] + offset)
+    return ClockLine(period, edge, slope * edge + offset)
 
 
 def _bent(x: np.ndarray, y: np.ndarray, weight: np.ndarray, spacing: int) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ FLAT = 0.1  # periods by which the middle half of the rows after a loss may diff
 SURELY = 0.05  # periods below a level, for a row to lie before it rose
 
 
-class Found(NamedTuple):
+class FoundEvents(NamedTuple):
     """Events among judged rows.
 
     rows  : int64; lost: int64, samples missing before each, 0 if the clock was set; shift: of the stamps, s
@@ -40,8 +40,8 @@ def tail_rows(grid: Judgement) -> int:
     return int(max(TAIL, min(grid.horizon, ENVELOPE_ROWS * 10 * grid.noise / grid.period)))
 
 
-def _found(rows: list[int], lost: list[int], shift: list[float]) -> Found:
-    return Found(np.array(rows, dtype=np.int64), np.array(lost, dtype=np.int64), np.array(shift))
+def _found(rows: list[int], lost: list[int], shift: list[float]) -> FoundEvents:
+    return FoundEvents(np.array(rows, dtype=np.int64), np.array(lost, dtype=np.int64), np.array(shift))
 
 
 class LossFinder:
@@ -50,7 +50,7 @@ class LossFinder:
     Stretches begin at the piece's first row and do not depend on the blocks that are fed.
     """
 
-    def __init__(self, judgement: Judgement, sink: Callable[[np.ndarray, Found], None]) -> None:
+    def __init__(self, judgement: Judgement, sink: Callable[[np.ndarray, FoundEvents], None]) -> None:
         self.judgement = judgement
         self._sink = sink
         self._back, self._ahead = {
@@ -90,15 +90,15 @@ class LossFinder:
         drop = max(0, high - self._back)
         self._times, self._low = self._times[drop:], high - drop
 
-    def _by_pauses(self, times: np.ndarray, low: int, high: int) -> Found:
+    def _by_pauses(self, times: np.ndarray, low: int, high: int) -> FoundEvents:
         first = max(low, 1)
         step = times[first:high] - times[first - 1 : high - 1]
         rows = np.flatnonzero(step > self.judgement.pause)
         periods = step[rows] / self.judgement.period
         lost = np.maximum(1, np.rint(periods) - 1).astype(np.int64)
-        return Found(rows + first, lost, step[rows] - self.judgement.period)
+        return FoundEvents(rows + first, lost, step[rows] - self.judgement.period)
 
-    def _by_steps(self, times: np.ndarray, low: int, high: int) -> Found:
+    def _by_steps(self, times: np.ndarray, low: int, high: int) -> FoundEvents:
         """A long step is a gap of as many periods as the median level after it is above the one before."""
         period = self.judgement.period
         level = times / period - np.arange(len(times))
@@ -116,9 +116,9 @@ class LossFinder:
         shift = np.nanmedian(next_, axis=1) - np.nanmedian(past, axis=1)
         lost = np.rint(shift).astype(np.int64)
         real = lost > 0
-        return Found(rows[real], lost[real], shift[real] * period)
+        return FoundEvents(rows[real], lost[real], shift[real] * period)
 
-    def _by_level(self, times: np.ndarray, low: int, high: int, last: bool) -> Found:
+    def _by_level(self, times: np.ndarray, low: int, high: int, last: bool) -> FoundEvents:
         """Lasting steps of the lower envelope.
 
         F, the least distance from the line in the horizon ahead, less B, the least one in the horizon behind (earlier
@@ -182,7 +182,7 @@ class _Scan:
         self.noise, self.reach = grid.noise, grid.reach
         self._first = backward_min(raised, width)
 
-    def run(self, low: int, stop: int) -> Found:
+    def run(self, low: int, stop: int) -> FoundEvents:
         rows: list[int] = []
         lost: list[int] = []
         shifts: list[float] = []

@@ -9,14 +9,14 @@ import numpy as np
 
 from vgyro.storage.clocks.evenness import Judgement
 from vgyro.storage.clocks.lines import Bins
-from vgyro.storage.clocks.losses import Found, LossFinder
+from vgyro.storage.clocks.losses import FoundEvents, LossFinder
 from vgyro.storage.clocks.model import MAX_GAPS
 
 LONG_LOSS = 1000  # samples; after as many, a line through both sides would hang on their number
 
 
 @dataclass
-class Piece:
+class ClockPiece:
     """start: its first kept row. restart: the clock began anew there. elapsed: s from the row before, else.
 
     first, last : stamps of its first and last row, s
@@ -54,7 +54,7 @@ class Collector:
 
     judgement: Judgement
     bin_rows: int
-    pieces: list[Piece] = field(default_factory=list)
+    pieces: list[ClockPiece] = field(default_factory=list)
     listed: list[Event] = field(default_factory=list)
     set_clocks: int = 0  # lasting steps of the stamps that are no whole periods
     step_sum: float = 0.0  # of usual steps, uneven stamps
@@ -89,7 +89,7 @@ class Collector:
             return np.empty(0, np.int64), np.empty(0, np.int64)
         return np.concatenate(self._rows), np.concatenate(self._lost)
 
-    def _take(self, times: np.ndarray, found: Found) -> None:
+    def _take(self, times: np.ndarray, found: FoundEvents) -> None:
         long = (found.lost > LONG_LOSS) & (self.judgement.losses != "pauses")
         cuts = found.rows[long].tolist()
         elapsed = (found.shift[long] + self.judgement.period).tolist()
@@ -106,7 +106,7 @@ class Collector:
     def _begin(self, first: float, restart: bool, elapsed: float) -> None:
         self._shift = 0.0
         bins = Bins(self.judgement.period, self.bin_rows)
-        self.pieces.append(Piece(self._row, restart and bool(self.pieces), elapsed, float(first), bins))
+        self.pieces.append(ClockPiece(self._row, restart and bool(self.pieces), elapsed, float(first), bins))
 
     def _add(self, times: np.ndarray, rows: np.ndarray, lost: np.ndarray, shift: np.ndarray) -> None:
         piece = self.pieces[-1]
@@ -130,13 +130,13 @@ class Collector:
         piece.counter, piece.last, self._shift = int(counter[-1]), float(times[-1]), float(moved[-1])
         self._row += len(times)
 
-    def _list(self, times: np.ndarray, rows: np.ndarray, lost: np.ndarray, piece: Piece) -> None:
+    def _list(self, times: np.ndarray, rows: np.ndarray, lost: np.ndarray, piece: ClockPiece) -> None:
         room = MAX_GAPS - len(self.listed)
         for row, count in zip(rows[lost > 0][:room].tolist(), lost[lost > 0][:room].tolist(), strict=True):
             before = times[row - 1] if row else piece.last
             self.listed.append(Event(row + self._row, count, float(before), float(times[row])))
 
-    def _count_steps(self, times: np.ndarray, piece: Piece) -> None:
+    def _count_steps(self, times: np.ndarray, piece: ClockPiece) -> None:
         steps = np.diff(times, prepend=times[:1] if piece.counter < 0 else piece.last)
         steps = steps[int(piece.counter < 0) :]
         steps = steps[steps <= self.judgement.pause]

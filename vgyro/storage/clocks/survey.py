@@ -14,7 +14,7 @@ from vgyro.errors import DataError
 from vgyro.storage.clocks.clock import Clock, Track
 from vgyro.storage.clocks.evenness import SHORTEST_PERIOD, Judgement
 from vgyro.storage.clocks.head import Rules, look
-from vgyro.storage.clocks.lines import Fit, Line, fit_lines
+from vgyro.storage.clocks.lines import ClockLine, StampFit, fit_lines
 from vgyro.storage.clocks.model import MAX_GAPS, ClockGap, ClockOptions, ClockRecord
 from vgyro.storage.clocks.pieces import Collector
 from vgyro.storage.clocks.repeats import Keeper
@@ -149,7 +149,7 @@ class _Pass:
             ),
         )
 
-    def _track(self, fit: Fit, judgement: Judgement) -> Track:
+    def _track(self, fit: StampFit, judgement: Judgement) -> Track:
         pieces = self.collector.pieces
         counters, times, events, lost = [0], [pieces[0].first], [], []
         on_line = judgement.time_from != "stamps"
@@ -178,7 +178,7 @@ class _Pass:
             self.filler.runs(),
         )
 
-    def _record(self, options: ClockOptions, fit: Fit, track: Track, judgement: Judgement) -> ClockRecord:
+    def _record(self, options: ClockOptions, fit: StampFit, track: Track, judgement: Judgement) -> ClockRecord:
         assert self.unfolder is not None
         rules, collector = self.rules, self.collector
         gaps = self._gaps(fit, track, judgement)
@@ -217,7 +217,7 @@ class _Pass:
             warnings=self._warnings(options, fit, judgement),
         )
 
-    def _gaps(self, fit: Fit, track: Track, judgement: Judgement) -> list[ClockGap]:
+    def _gaps(self, fit: StampFit, track: Track, judgement: Judgement) -> list[ClockGap]:
         """In order of time; no more than the first 1000 of each kind."""
         found: list[tuple[int, int | None, float, float, str]] = []
         cause = {
@@ -244,7 +244,7 @@ class _Pass:
             gaps.append(ClockGap(float(last + fit.period), duration, lost, why))
         return gaps
 
-    def _warnings(self, options: ClockOptions, fit: Fit, judgement: Judgement) -> list[str]:
+    def _warnings(self, options: ClockOptions, fit: StampFit, judgement: Judgement) -> list[str]:
         assert self.unfolder is not None
         rate = 1 / fit.period
         texts = []
@@ -267,7 +267,7 @@ class _Pass:
         return texts
 
 
-def _fit(collector: Collector, judgement: Judgement) -> Fit:
+def _fit(collector: Collector, judgement: Judgement) -> StampFit:
     pieces = collector.pieces
     if judgement.even:
         bins = [piece.bins.close() for piece in pieces]
@@ -279,6 +279,6 @@ def _fit(collector: Collector, judgement: Judgement) -> Fit:
     length = sum(piece.last - piece.first for piece in pieces)
     steps = sum(piece.counter for piece in pieces)
     period = length / steps if steps else judgement.period
-    lines: list[Line] = []
+    lines: list[ClockLine] = []
     spread = judgement.jitter / np.sqrt(max(1, collector.step_count))
-    return Fit(period, float(spread), None, lines)
+    return StampFit(period, float(spread), None, lines)

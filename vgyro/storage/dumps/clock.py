@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vgyro.board import Board
-from vgyro.storage.dumps.scan import Content, Found
+from vgyro.storage.dumps.scan import Content, FoundFrames
 from vgyro.storage.dumps.selection import CounterRule
 
 HISTORY = 4096  # frames that are remembered to know a block that was sent again
@@ -45,7 +45,7 @@ class Timed(NamedTuple):
     rows : their places in the chunk; None: all of them
     """
 
-    found: Found
+    found: FoundFrames
     rows: np.ndarray | None
     counter: np.ndarray
     time: np.ndarray
@@ -55,7 +55,7 @@ class Timed(NamedTuple):
 
 
 @dataclass
-class Clock:
+class FrameClock:
     """Undo wraps and find gaps, chunk by chunk.
 
     board          : its counter and time stamp
@@ -76,7 +76,7 @@ class Clock:
     _first_counter: int = 0
     _ticks: int = 0
     _segment: int = 0
-    _last: Found | None = None
+    _last: FoundFrames | None = None
     _history: deque[_Sent] = field(default_factory=deque)
     _remembered: int = 0  # frames in _history
     _lag: int = 0
@@ -86,7 +86,7 @@ class Clock:
         if self.board.counter:
             self._rule = CounterRule(self.board.counter.step, self.board.counter.modulus)
 
-    def feed(self, found: Found) -> Timed:
+    def feed(self, found: FoundFrames) -> Timed:
         """Place the frames of the next chunk in time."""
         fresh = self._fresh(found)
         rows = None if fresh is None else np.flatnonzero(fresh)
@@ -121,7 +121,7 @@ class Clock:
             return None
         return self.in_step_frames / (self.in_step_ticks * self.board.timestamp.tick_s)
 
-    def _steps(self, kept: Found) -> tuple[np.ndarray, np.ndarray | None, list[Jump]]:
+    def _steps(self, kept: FoundFrames) -> tuple[np.ndarray, np.ndarray | None, list[Jump]]:
         """Frames and ticks from the frame before to each, int64 [n] each; the very first frame's are 0."""
         stamp = _with_last(self._last and self._last.stamp, kept.stamp)
         elapsed = self._elapsed(stamp)
@@ -154,7 +154,7 @@ class Clock:
         self.in_step_frames += int(frames[plain].sum())
         self.in_step_ticks += int(ticks[plain].sum())
 
-    def _by_bytes(self, kept: Found) -> tuple[np.ndarray, None, list[Jump]]:
+    def _by_bytes(self, kept: FoundFrames) -> tuple[np.ndarray, None, list[Jump]]:
         """Neither counter nor time stamp: damaged bytes stand for as many frames as they could have been."""
         before = kept.stop[kept.breaks - 1]
         before[0] = kept.start[0] if self._last is None else self._last.stop[0]
@@ -171,7 +171,7 @@ class Clock:
         ]
         return frames, None, jumps
 
-    def _by_counter(self, kept: Found) -> tuple[np.ndarray, list[Jump]]:
+    def _by_counter(self, kept: FoundFrames) -> tuple[np.ndarray, list[Jump]]:
         """The counter alone: a gap is as short as it can be; a counter near zero has restarted."""
         rule = self._known_rule()
         assert kept.counter is not None
@@ -257,7 +257,7 @@ class Clock:
             raise ValueError("the board sends no counter")
         return self._rule
 
-    def _fresh(self, found: Found) -> np.ndarray | None:
+    def _fresh(self, found: FoundFrames) -> np.ndarray | None:
         """bool [n]: false for a frame that was sent before, alone or in a block: same counter, same bytes.
 
         None: there is no such frame.

@@ -9,7 +9,7 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.board import TYPE_BYTES, BinaryFrame, Board, ByteOrder
-from vgyro.engine.frames import Column
+from vgyro.engine.frames import FrameColumn
 from vgyro.storage.dumps.rechecksum import right_checksum, same_order, shown_key
 from vgyro.storage.layout import columns_of
 
@@ -316,5 +316,5 @@ def _roughness(buffer: np.ndarray, places: np.ndarray, board: Board, frame: Bina
     return float(np.median(medians))
 
 
-def _read(buffer: np.ndarray, places: np.ndarray, frame: BinaryFrame, columns: list[Column]) -> list[np.ndarray]:
+def _read(buffer: np.ndarray, places: np.ndarray, frame: BinaryFrame, columns: list[FrameColumn]) -> list[np.ndarray]:
     return engines.get("reference").frames.read_columns(buffer, places, frame.length, columns)

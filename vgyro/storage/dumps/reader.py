@@ -11,16 +11,16 @@ import numpy as np
 
 from vgyro.board import BinaryFrame, Board, TextFrame
 from vgyro.config import IntegrityOptions
-from vgyro.storage.dumps.clock import LOST, PAUSE, Clock, Timed
+from vgyro.storage.dumps.clock import LOST, PAUSE, FrameClock, Timed
 from vgyro.storage.dumps.diagnose import diagnose
-from vgyro.storage.dumps.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Found, Tail
+from vgyro.storage.dumps.scan import BAD_CHECKSUM, INVALID, NO_SYNC, FoundFrames, Tail
 from vgyro.storage.dumps.sniff import Probe, boards_that_fit, probe, scanner_of
 from vgyro.storage.dumps.text_refusal import describe, first_line, line_number, refuse_text
 from vgyro.storage.frames import Frames, channel_watches
 from vgyro.storage.inputs import BOARDS
 from vgyro.storage.integrity import FileRecord, Gap, Integrity, Ledger
 from vgyro.storage.sources import Sources, open_sources
-from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
+from vgyro.storage.verdict import RecordingOutcome, conclude, refuse_if_needed
 
 CHUNK_BYTES = 1 << 22
 BOOT_BYTES = 4096  # an acknowledgement or boot text of so many bytes is not held against a recording
@@ -74,7 +74,7 @@ class DumpReader:
         seen = probe(self._sources, self.board)
         self._probe = seen
         scanner = self._scanner = scanner_of(self.board, seen.typical_length, self.engine, seen.forms)
-        self._clock = Clock(self.board, self.rate_hz, seen.period_ticks, seen.typical_length)
+        self._clock = FrameClock(self.board, self.rate_hz, seen.period_ticks, seen.typical_length)
         self._length = seen.typical_length
         for block in self._sources.chunks(self.chunk_bytes):
             yield from self._chunk(scanner.feed(block))
@@ -82,7 +82,7 @@ class DumpReader:
         self._note_tail(scanner.tail())
         self._conclude()
 
-    def _chunk(self, found: Found) -> Iterator[Frames]:
+    def _chunk(self, found: FoundFrames) -> Iterator[Frames]:
         if not len(found.start):
             return
         timed = self._clock.feed(found)
@@ -96,7 +96,7 @@ class DumpReader:
             watch.feed(timed.found.channels[name], timed.time)
         yield Frames(timed.found.channels, timed.counter, timed.time, timed.segment)
 
-    def _note(self, found: Found, timed: Timed) -> None:
+    def _note(self, found: FoundFrames, timed: Timed) -> None:
         """Damaged bytes before each frame, and gaps in time."""
         borders = self._sources.borders()
         jumps = {jump.row if timed.rows is None else int(timed.rows[jump.row]): jump for jump in timed.jumps}
@@ -159,7 +159,7 @@ class DumpReader:
 
     def _conclude(self) -> None:
         where = str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more"
-        outcome = Outcome(
+        outcome = RecordingOutcome(
             board=self.board,
             values="counts",
             files=file_records(self._sources),

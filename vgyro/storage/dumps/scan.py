@@ -11,7 +11,7 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.board import BinaryFrame, Board
-from vgyro.engine.frames import Column
+from vgyro.engine.frames import FrameColumn
 from vgyro.storage.dumps.selection import STRAY_FRAMES, CounterRule, breaks_of, last_alone, select, strays
 from vgyro.storage.layout import columns_of, kept_channels
 
@@ -53,7 +53,7 @@ class Hole:
 NO_HOLES: Mapping[int, Hole] = MappingProxyType({})
 
 
-class Found(NamedTuple):
+class FoundFrames(NamedTuple):
     """Good frames of one chunk, in order.
 
     start, stop : int64 [n], offsets in the stream, [start, stop)
@@ -75,11 +75,11 @@ class Found(NamedTuple):
     breaks: np.ndarray
     holes: Mapping[int, Hole] = NO_HOLES
 
-    def take(self, index: np.ndarray, rule: CounterRule | None) -> Found:
+    def take(self, index: np.ndarray, rule: CounterRule | None) -> FoundFrames:
         """The frames of an index or a mask."""
         start, stop = self.start[index], self.stop[index]
         counter = None if self.counter is None else self.counter[index]
-        return Found(
+        return FoundFrames(
             start,
             stop,
             self.damage[index],
@@ -112,7 +112,7 @@ class Scanner(Protocol):
     others: int
     refused: tuple[int, bytes] | None
 
-    def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
+    def feed(self, data: bytes | memoryview, last: bool = False) -> FoundFrames:
         """Take the next bytes; return the frames that are certain by now."""
 
     def tail(self) -> Tail:
@@ -150,7 +150,7 @@ class BinaryScanner:
         self._counter_column = columns_of(frame, [counter.field] if counter else [])
         self._stamp_column = columns_of(frame, [stamp.field] if stamp else [])
 
-    def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
+    def feed(self, data: bytes | memoryview, last: bool = False) -> FoundFrames:
         """Take the next bytes; return the frames that are certain by now."""
         self._buffer = np.concatenate([self._buffer, np.frombuffer(data, dtype=np.uint8)])
         end = self._base + len(self._buffer)
@@ -195,7 +195,7 @@ class BinaryScanner:
             return 0, min(waiting, int(places[0]))
         return certain, int(places[certain])
 
-    def _emit(self, places: np.ndarray, settled: int, final: bool) -> Found:
+    def _emit(self, places: np.ndarray, settled: int, final: bool) -> FoundFrames:
         """The first `settled` candidates without those that overlap better ones and those that are there by chance."""
         counter, rule = self._read(places, self._counter_column), self._rule
         breaks = self._breaks(places, counter)
@@ -232,7 +232,7 @@ class BinaryScanner:
         previous = None if self._previous is None else (self._previous[0] - self._base, self._previous[1])
         return strays(places, self._length, counter, self._rule, rows, previous)
 
-    def _found(self, places: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> Found:
+    def _found(self, places: np.ndarray, counter: np.ndarray | None, breaks: np.ndarray) -> FoundFrames:
         start, stop = places + self._base, places + (self._base + self._length)
         damage = np.zeros(len(start), dtype=np.uint8)
         if len(start):
@@ -242,7 +242,7 @@ class BinaryScanner:
             damage[breaks[failures > 0]] = BAD_CHECKSUM
             self._done = int(stop[-1])
         channels = self._kernels.read_columns(self._buffer, places, self._length, self._columns)
-        return Found(
+        return FoundFrames(
             start,
             stop,
             damage,
@@ -253,7 +253,7 @@ class BinaryScanner:
             breaks,
         )
 
-    def _read(self, places: np.ndarray, columns: list[Column]) -> np.ndarray | None:
+    def _read(self, places: np.ndarray, columns: list[FrameColumn]) -> np.ndarray | None:
         """Counter or time stamp of frames, int64 [n]; None for a board without."""
         if not columns:
             return None

@@ -10,7 +10,7 @@ import numpy as np
 
 from vgyro.board import BinaryFrame, Board, TextFrame
 from vgyro.errors import ConfigError, DataError
-from vgyro.storage.dumps.scan import BinaryScanner, Found, Scanner
+from vgyro.storage.dumps.scan import BinaryScanner, FoundFrames, Scanner
 from vgyro.storage.dumps.selection import CounterRule
 from vgyro.storage.dumps.text_form import recurring_forms, typical_line
 from vgyro.storage.dumps.text_scan import TextScanner
@@ -90,7 +90,7 @@ def _probe_text(head: bytes, board: Board, frame: TextFrame) -> Probe:
     return Probe(count, min(1.0, share), _period(found, board), length, _counter_step(found), forms, head)
 
 
-def _period(found: Found, board: Board) -> float | None:
+def _period(found: FoundFrames, board: Board) -> float | None:
     if board.timestamp is None:
         return None
     default = 1 / (board.frame_rate_hz * board.timestamp.tick_s)
@@ -107,7 +107,7 @@ def _period(found: Found, board: Board) -> float | None:
     return float(np.median(steps)) if len(steps) else default
 
 
-def _counter_step(found: Found) -> int | None:
+def _counter_step(found: FoundFrames) -> int | None:
     if found.counter is None or len(found.counter) < 2:
         return None
     adjacent = found.start[1:] - found.stop[:-1] <= 2

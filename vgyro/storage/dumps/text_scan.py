@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.csv
 
 from vgyro.board import Board, TextFrame
-from vgyro.storage.dumps.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Content, Found, Hole, Tail
+from vgyro.storage.dumps.scan import BAD_CHECKSUM, INVALID, NO_SYNC, Content, FoundFrames, Hole, Tail
 from vgyro.storage.dumps.selection import CounterRule, breaks_of
 from vgyro.storage.dumps.text_form import (
     BLANK,
@@ -73,7 +73,7 @@ class TextScanner:
         self._first_open = frame.checksum.family == "none" and not opening(frame)
         self.typical_length = self.typical_length or float(len(frame.prefix) + 4 * len(self._types))
 
-    def feed(self, data: bytes | memoryview, last: bool = False) -> Found:
+    def feed(self, data: bytes | memoryview, last: bool = False) -> FoundFrames:
         """Take the next bytes; return the frames that are certain by now."""
         if self._fresh and self._frame.checksum.family == "none":
             # A line must begin after a line end; the stream's first line gets one, and is judged apart.
@@ -152,7 +152,7 @@ class TextScanner:
             return texts, start, stop
         return texts[1:], start[1:], stop[1:]
 
-    def _found(self, texts: list[bytes], start: np.ndarray, stop: np.ndarray, end: int) -> Found:
+    def _found(self, texts: list[bytes], start: np.ndarray, stop: np.ndarray, end: int) -> FoundFrames:
         """The frames of the lines; what lies between them and up to `end` is judged as far as its lines are whole."""
         values, fits = self._values(texts)
         valid = np.ones(len(texts), dtype=bool)
@@ -186,7 +186,7 @@ class TextScanner:
 
     def _frames(
         self, values: dict[str, np.ndarray], start: np.ndarray, stop: np.ndarray, damage: np.ndarray, holes: dict
-    ) -> Found:
+    ) -> FoundFrames:
         raw = np.column_stack([column.astype(np.float64) for column in values.values()])
         content = Content(raw.reshape(-1).view(np.uint8), np.arange(len(raw)) * raw.strides[0], raw.strides[0])
         counter = values[self.board.counter.field].astype(np.int64) if self.board.counter else None
@@ -194,7 +194,7 @@ class TextScanner:
         channels = {name: values[name] for name in kept_channels(self.board)}
         rule = CounterRule(self.board.counter.step, self.board.counter.modulus) if self.board.counter else None
         breaks = breaks_of(start, stop, counter, rule)
-        return Found(start, stop, damage, content, counter, stamp, channels, breaks, holes)
+        return FoundFrames(start, stop, damage, content, counter, stamp, channels, breaks, holes)
 
     def _judge(self, begin: int, end: int, invalid: set[int], whole: bool = True) -> None:
         """Sort the lines from begin to end, none of them good, into damaged and other ones.

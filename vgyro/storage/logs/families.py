@@ -25,7 +25,7 @@ PIECE = 1 << 20
 
 
 @dataclass(frozen=True)
-class Family:
+class LogFamily:
     """A family of logs.
 
     what    : for people;  endings : the usual ones
@@ -101,15 +101,15 @@ def _is_matlab(head: bytes, _: Path) -> bool:
     return head.startswith(b"MATLAB 5.0") or any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048, 4096))
 
 
-FAMILIES: dict[str, Family] = {
-    "parquet": Family("Parquet", (".parquet",), lambda head, _: head.startswith(b"PAR1"), _open_parquet),
-    "ulog": Family(
+FAMILIES: dict[str, LogFamily] = {
+    "parquet": LogFamily("Parquet", (".parquet",), lambda head, _: head.startswith(b"PAR1"), _open_parquet),
+    "ulog": LogFamily(
         "PX4 ULog", (".ulg", ".ulog"), lambda head, _: head.startswith(b"ULog\x01\x12\x35"), _open_ulog, "pyulog"
     ),
-    "bag": Family("ROS 1 or ROS 2 bag, MCAP", (".bag", ".mcap", ".db3"), _is_bag, _open_bag, "rosbags"),
-    "numpy": Family("NumPy array", (".npy", ".npz"), _is_numpy, _open_numpy),
-    "matlab": Family("MATLAB or HDF5 file", (".mat", ".h5", ".hdf5"), _is_matlab, _open_matlab, "h5py"),
-    "text": Family("text with columns", (".csv", ".tsv", ".txt", ".log", ".dat"), _is_text, _open_text),
+    "bag": LogFamily("ROS 1 or ROS 2 bag, MCAP", (".bag", ".mcap", ".db3"), _is_bag, _open_bag, "rosbags"),
+    "numpy": LogFamily("NumPy array", (".npy", ".npz"), _is_numpy, _open_numpy),
+    "matlab": LogFamily("MATLAB or HDF5 file", (".mat", ".h5", ".hdf5"), _is_matlab, _open_matlab, "h5py"),
+    "text": LogFamily("text with columns", (".csv", ".tsv", ".txt", ".log", ".dat"), _is_text, _open_text),
 }
 """By name, in the order in which they are tried."""
 

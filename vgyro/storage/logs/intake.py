@@ -14,8 +14,8 @@ from vgyro.errors import DataError
 from vgyro.log import TO_DEG_S, Log, LogArray, LogTime, RateUnit
 from vgyro.storage.integrity import Ledger
 from vgyro.storage.logs.spool import Spool
-from vgyro.storage.logs.streams import Stream, column_of, table_of
-from vgyro.storage.logs.table import LogFile, Rows
+from vgyro.storage.logs.streams import LogStream, column_of, table_of
+from vgyro.storage.logs.table import LogFile, LogRows
 
 STAMP, SAME = "\0stamp", "\0same"
 """Columns of a spool beside the channels: the stamp, and whether a row equals the one before in every channel."""
@@ -38,7 +38,7 @@ class Intake:
     infinite : channel → values that were infinite, and count as missing
     """
 
-    stream: Stream
+    stream: LogStream
     time: LogTime | None
     kind: str
     spool: Spool = field(default_factory=Spool)
@@ -137,7 +137,7 @@ class Taken:
 
 
 def take_in(
-    streams: Sequence[Stream],
+    streams: Sequence[LogStream],
     log: Log,
     array: LogArray | None,
     heads: Mapping[Path, LogFile],
@@ -173,7 +173,7 @@ def factor_of(unit: RateUnit | None) -> float:
     return 1.0 if unit is None else TO_DEG_S[unit]
 
 
-def time_of(stream: Stream, log: Log, heads: Mapping[Path, LogFile]) -> tuple[LogTime | None, str]:
+def time_of(stream: LogStream, log: Log, heads: Mapping[Path, LogFile]) -> tuple[LogTime | None, str]:
     """The time column of a stream with its unit, and its kind.  raises : DataError if it is not there"""
     if log.stamp is None:
         return None, ""
@@ -205,7 +205,7 @@ def _read(
     ledger.bad += opened.account.bad
 
 
-def _note(rows: Rows, name: str, intakes: Sequence[Intake], ledger: Ledger) -> None:
+def _note(rows: LogRows, name: str, intakes: Sequence[Intake], ledger: Ledger) -> None:
     for number, line in enumerate(rows.bad):
         ledger.add_damage(name, line.place, line.place + 1, 0, f"{line.found!r}: {line.expected}")
         for intake in intakes:

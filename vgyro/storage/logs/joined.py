@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vgyro.alignment import FOUND, Stream, interpolate, noise_gain, positions, refuse_clock, relative_clock
+from vgyro.alignment import FOUND, AlignedStream, interpolate, noise_gain, positions, refuse_clock, relative_clock
 from vgyro.board import Board, Gyro
 from vgyro.dataset import AT_REST, Recording
 from vgyro.errors import DataError
@@ -132,13 +132,13 @@ class Joined:
         if paired:
             at = nearest(frames.time, readings)
         else:
-            at = positions(Stream(frames.time, frames.time, other.rate_hz), readings)
+            at = positions(AlignedStream(frames.time, frames.time, other.rate_hz), readings)
         gain = noise_gain(at[np.isfinite(at)])
         other.placing.alignment = {**found, "to": first.name, "interpolated": not paired,
                                    "noise_gain": float(gain.mean()) if gain.size else 1.0}  # fmt: skip
         return {name: interpolate(values, at, frames.segment) for name, values in frames.counts.items()}
 
-    def _motion(self, whole: Whole, other: Whole) -> Stream:
+    def _motion(self, whole: Whole, other: Whole) -> AlignedStream:
         """The gyro of a stream about the axis that moves most of those that both have."""
         axes = [gyro.axis for gyro in self._gyros(whole) if gyro.axis in {one.axis for one in self._gyros(other)}]
         if not axes:
@@ -148,7 +148,7 @@ class Joined:
         axis = max(sorted(set(axes)), key=lambda name: min(self._spread(whole, name), self._spread(other, name)))
         gyro = next(gyro for gyro in self._gyros(whole) if gyro.axis == axis)
         rate = gyro.sign * (whole.frames.counts[gyro.field] - gyro.bias) * gyro.scale
-        return Stream(whole.frames.time, rate, whole.rate_hz)
+        return AlignedStream(whole.frames.time, rate, whole.rate_hz)
 
     def _spread(self, whole: Whole, axis: str) -> float:
         gyro = next(gyro for gyro in self._gyros(whole) if gyro.axis == axis)

@@ -19,7 +19,7 @@ from vgyro.storage.logs.streams import streams_of
 from vgyro.storage.logs.table import LogFile
 from vgyro.storage.logs.uneven import MOST_UNEVEN, too_uneven, uneven_note
 from vgyro.storage.tables import sha256_of_file
-from vgyro.storage.verdict import Outcome, conclude, refuse_if_needed
+from vgyro.storage.verdict import RecordingOutcome, conclude, refuse_if_needed
 
 
 @dataclass
@@ -89,7 +89,7 @@ class LogReader:
         """The record. clocks : of the streams, that of the array's times first."""
         where = str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more"
         records = [one.record() for one in clocks]
-        outcome = Outcome(
+        outcome = RecordingOutcome(
             board=self.board,
             values=self.values,
             files=[file_record(path, head, self._names[path]) for path, head in self._heads.items()],

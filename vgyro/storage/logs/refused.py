@@ -16,7 +16,7 @@ YEARS_US = (946_684_800_000_000, 4_102_444_800_000_000)
 """2000 to 2100, µs since 1970."""
 
 
-class Refused(NamedTuple):
+class RefusedFamily(NamedTuple):
     """A kind of file: how it begins, what it is, what to do instead."""
 
     begins: tuple[bytes, ...] | Callable[[bytes], bool]
@@ -51,45 +51,47 @@ def _mat4(head: bytes) -> bool:
     return False
 
 
-REFUSED: tuple[Refused, ...] = (
-    Refused((b"\x89PNG\r\n",), "a PNG picture", NOT_A_LOG),
-    Refused((b"\xff\xd8\xff",), "a JPEG picture", NOT_A_LOG),
-    Refused((b"GIF87a", b"GIF89a"), "a GIF picture", NOT_A_LOG),
-    Refused((b"%PDF-",), "a PDF document", NOT_A_LOG),
-    Refused(
+REFUSED: tuple[RefusedFamily, ...] = (
+    RefusedFamily((b"\x89PNG\r\n",), "a PNG picture", NOT_A_LOG),
+    RefusedFamily((b"\xff\xd8\xff",), "a JPEG picture", NOT_A_LOG),
+    RefusedFamily((b"GIF87a", b"GIF89a"), "a GIF picture", NOT_A_LOG),
+    RefusedFamily((b"%PDF-",), "a PDF document", NOT_A_LOG),
+    RefusedFamily(
         _zip_holds(b"[Content_Types].xml", b"xl/", b"_rels/"), "an Excel workbook or Office document", "save it as CSV"
     ),
-    Refused(_zip_holds(b"opendocument"), "an OpenDocument spreadsheet", "save it as CSV"),
-    Refused((b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",), "an old Excel workbook (.xls)", "save it as CSV"),
-    Refused((b"PK\x03\x04", b"PK\x05\x06"), "a zip archive", UNPACK),
-    Refused((b"7z\xbc\xaf\x27\x1c",), "a 7-Zip archive", UNPACK),
-    Refused((b"Rar!\x1a\x07",), "a RAR archive", UNPACK),
-    Refused((b"BZh",), "compressed by bzip2", UNPACK),
-    Refused((b"\xfd7zXZ\0",), "compressed by xz", UNPACK),
-    Refused((b"\x04\x22\x4d\x18",), "compressed by lz4", UNPACK),
-    Refused(lambda head: head[257:262] == b"ustar", "a tar archive", UNPACK),
-    Refused((b"#ROSBAG V1",), "a ROS bag of version 1", "convert it: rosbag fix"),
-    Refused(
+    RefusedFamily(_zip_holds(b"opendocument"), "an OpenDocument spreadsheet", "save it as CSV"),
+    RefusedFamily((b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",), "an old Excel workbook (.xls)", "save it as CSV"),
+    RefusedFamily((b"PK\x03\x04", b"PK\x05\x06"), "a zip archive", UNPACK),
+    RefusedFamily((b"7z\xbc\xaf\x27\x1c",), "a 7-Zip archive", UNPACK),
+    RefusedFamily((b"Rar!\x1a\x07",), "a RAR archive", UNPACK),
+    RefusedFamily((b"BZh",), "compressed by bzip2", UNPACK),
+    RefusedFamily((b"\xfd7zXZ\0",), "compressed by xz", UNPACK),
+    RefusedFamily((b"\x04\x22\x4d\x18",), "compressed by lz4", UNPACK),
+    RefusedFamily(lambda head: head[257:262] == b"ustar", "a tar archive", UNPACK),
+    RefusedFamily((b"#ROSBAG V1",), "a ROS bag of version 1", "convert it: rosbag fix"),
+    RefusedFamily(
         _tlog, "a MAVLink .tlog", "convert it to CSV (mavlogdump.py --format csv), or take the ULog from the board"
     ),
-    Refused((b"\xa3\x95\x80",), "an ArduPilot DataFlash log (.bin)", "convert it to CSV (mavlogdump.py --format csv)"),
-    Refused((b"H Product:Blackbox",), "a Betaflight blackbox log", "convert it to CSV: blackbox_decode"),
-    Refused((b"TDSm",), "a LabVIEW TDMS file", AS_CSV),
-    Refused((b"MDF     ", b"UnFinMF "), "an ASAM MDF file", AS_CSV),
-    Refused((b"ARROW1\0\0", b"FEA1"), "an Arrow or Feather file", "save it as Parquet"),
-    Refused((b"Obj\x01",), "an Avro file", AS_CSV),
-    Refused((b"ORC",), "an ORC file", "save it as Parquet"),
-    Refused(lambda head: head[:4] == b"RIFF" and head[8:12] == b"WAVE", "a WAV sound", AS_CSV),
-    Refused((b"\x7fELF", b"MZ"), "a program", NOT_A_LOG),
-    Refused(_pickle, "a Python pickle, which could run any program", "save it as Parquet, or by numpy.save"),
-    Refused(_mat4, "a MATLAB 4 file", "save it again in MATLAB: save -v7"),
-    Refused((b"version https://git-lfs",), "a Git LFS pointer, not the file itself", "fetch it: git lfs pull"),
-    Refused((b"<!DOCTYPE html", b"<!doctype html", b"<html"), "a web page", "download the file itself"),
-    Refused((b"{\\rtf",), "an RTF document", "save it as plain text"),
+    RefusedFamily(
+        (b"\xa3\x95\x80",), "an ArduPilot DataFlash log (.bin)", "convert it to CSV (mavlogdump.py --format csv)"
+    ),
+    RefusedFamily((b"H Product:Blackbox",), "a Betaflight blackbox log", "convert it to CSV: blackbox_decode"),
+    RefusedFamily((b"TDSm",), "a LabVIEW TDMS file", AS_CSV),
+    RefusedFamily((b"MDF     ", b"UnFinMF "), "an ASAM MDF file", AS_CSV),
+    RefusedFamily((b"ARROW1\0\0", b"FEA1"), "an Arrow or Feather file", "save it as Parquet"),
+    RefusedFamily((b"Obj\x01",), "an Avro file", AS_CSV),
+    RefusedFamily((b"ORC",), "an ORC file", "save it as Parquet"),
+    RefusedFamily(lambda head: head[:4] == b"RIFF" and head[8:12] == b"WAVE", "a WAV sound", AS_CSV),
+    RefusedFamily((b"\x7fELF", b"MZ"), "a program", NOT_A_LOG),
+    RefusedFamily(_pickle, "a Python pickle, which could run any program", "save it as Parquet, or by numpy.save"),
+    RefusedFamily(_mat4, "a MATLAB 4 file", "save it again in MATLAB: save -v7"),
+    RefusedFamily((b"version https://git-lfs",), "a Git LFS pointer, not the file itself", "fetch it: git lfs pull"),
+    RefusedFamily((b"<!DOCTYPE html", b"<!doctype html", b"<html"), "a web page", "download the file itself"),
+    RefusedFamily((b"{\\rtf",), "an RTF document", "save it as plain text"),
 )
 
 
-def named(head: bytes) -> Refused | None:
+def named(head: bytes) -> RefusedFamily | None:
     """What a file is that is none of the logs; None where nobody knows."""
     for kind in REFUSED:
         if kind.begins(head) if callable(kind.begins) else head.startswith(kind.begins):

@@ -18,7 +18,7 @@ Where = tuple[tuple[str, int | float | str], ...]
 
 
 @dataclass(frozen=True)
-class Stream:
+class LogStream:
     """Channels that are sampled together.
 
     files   : in order, one after the other in time
@@ -50,7 +50,7 @@ def streams_of(
     array: LogArray | None,
     heads: Mapping[Path, LogFile],
     left_out: Sequence[str] = (),
-) -> list[Stream]:
+) -> list[LogStream]:
     """The streams of a recording, in the order of the board's gyros.
 
     files  : of the recording, in order, folders opened;  heads : those that can be read;  left_out : why not others
@@ -69,7 +69,7 @@ def streams_of(
         # A thermometer of the log's only table goes with the gyros that are there, whatever tells these apart.
         key = (chosen, _table(heads[chosen[0]], table, place.column), tuple(place.where.items()))
         grouped.setdefault(key, {})[channel] = place.column
-    return [Stream(files, table, where, columns) for (files, table, where), columns in grouped.items()]
+    return [LogStream(files, table, where, columns) for (files, table, where), columns in grouped.items()]
 
 
 def place_of(channel: str, log: Log, board: Board, array: LogArray | None) -> tuple[Place, bool]:

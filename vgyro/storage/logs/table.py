@@ -55,7 +55,7 @@ class BadLine:
     expected: str
 
 
-class Rows(NamedTuple):
+class LogRows(NamedTuple):
     """Some rows of a table.
 
     batch : the wanted columns, in the wanted order; a missing value is null or NaN
@@ -100,7 +100,7 @@ class LogFile(Protocol):
     def tables(self) -> tuple[LogTable, ...]:
         """The tables that hold numbers, in the file's order."""
 
-    def rows(self, table: str, columns: Sequence[str]) -> Iterator[Rows]:
+    def rows(self, table: str, columns: Sequence[str]) -> Iterator[LogRows]:
         """Stream some columns of one table, at most about 2^18 rows at a time.
 
         raises : DataError for a table or column that is not there, and for a file that breaks off with nothing read;

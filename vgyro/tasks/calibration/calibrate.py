@@ -24,7 +24,7 @@ from vgyro.config import CalibrationOptions, RestOptions
 from vgyro.dataset import FileReference, Manifest, values_of
 from vgyro.storage.tables import read_json, write_json
 from vgyro.tasks.calibration.suspicions import suspicions_of
-from vgyro.tasks.calibration.tables import Source, Test, cross_axes, fit_tests, nominal_of
+from vgyro.tasks.calibration.tables import RecordingSource, TableTest, cross_axes, fit_tests, nominal_of
 from vgyro.tasks.calibration.thermal import Thermal, read_rests, temperature_record, thermal_of, worth_it
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.rates.block_means import thermometer_of
@@ -81,7 +81,7 @@ def main(task: Task) -> None:
     write_json(task.output("calibration"), record)
 
 
-def usable(task: Task, manifest: Manifest) -> tuple[list[Source], dict[str, str]]:
+def usable(task: Task, manifest: Manifest) -> tuple[list[RecordingSource], dict[str, str]]:
     """Recordings that decode did not refuse and that hold counts, and those left out with the reason."""
     recordings = [recording for recording in manifest.recordings if recording.kind in KINDS]
     logs = iter(task.inputs.get("references", []))
@@ -98,14 +98,14 @@ def usable(task: Task, manifest: Manifest) -> tuple[list[Source], dict[str, str]
         elif values_of(manifest, recording) == "rates":
             reason = "holds rates, not counts: nothing to calibrate"
         else:
-            sources.append(Source(recording, frames, float(about["rate_hz"]), log))
+            sources.append(RecordingSource(recording, frames, float(about["rate_hz"]), log))
             continue
         if recording.kind == "calibration":
             skipped[recording.name] = reason
     return sources, skipped
 
 
-def main_fit(gyro: str, tests: list[Test], board: Board) -> tuple[ScaleFit, str | None]:
+def main_fit(gyro: str, tests: list[TableTest], board: Board) -> tuple[ScaleFit, str | None]:
     """The first fit in which the gyro was measured, and its recording; else nominal, with the reason."""
     fits = [(fit, test.name) for test in tests for fit in test.fits if fit.gyro == gyro]
     for fit, recording in fits:
@@ -124,7 +124,7 @@ def figures_of(fit: ScaleFit, thermal: Thermal, crossed: Finding) -> dict[str, A
     return {name: figure_record(name, known.get(name, missing)) for name in FIGURES}
 
 
-def test_record(axis: str, tests: list[Test], latitude_deg: float | None) -> dict[str, Any]:
+def test_record(axis: str, tests: list[TableTest], latitude_deg: float | None) -> dict[str, Any]:
     """How the gyros of an axis were tested: rates and times of the first recording, temperatures of all."""
     about = [test for test in tests if test.axis == axis]
     means = about[0].means

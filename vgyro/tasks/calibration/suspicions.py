@@ -17,13 +17,13 @@ from vgyro.calibration.suspicions import (
 )
 from vgyro.config import CalibrationOptions
 from vgyro.storage.tables import read_column
-from vgyro.tasks.calibration.tables import Source, Test, plateaus_of
+from vgyro.tasks.calibration.tables import RecordingSource, TableTest, plateaus_of
 
 BIN_S = 0.1
 
 
 def suspicions_of(
-    sources: Sequence[Source], tests: Sequence[Test], board: Board, options: CalibrationOptions
+    sources: Sequence[RecordingSource], tests: Sequence[TableTest], board: Board, options: CalibrationOptions
 ) -> list[str]:
     """Sentences on what is surely wrong, one a mistake.
 
@@ -42,14 +42,14 @@ def suspicions_of(
     return sentences
 
 
-def _of_scales(test: Test, gyros: Sequence[Gyro]) -> list[Suspicion]:
+def _of_scales(test: TableTest, gyros: Sequence[Gyro]) -> list[Suspicion]:
     relative = [
         test.fit(gyro.name).scale / gyro.scale if test.fit(gyro.name).source == "measured" else np.nan for gyro in gyros
     ]
     return scale_suspicions([gyro.name for gyro in gyros], np.array(relative))
 
 
-def _of_times(source: Source, gyros: Sequence[Gyro], plateaus: Sequence[Plateau]) -> list[Suspicion]:
+def _of_times(source: RecordingSource, gyros: Sequence[Gyro], plateaus: Sequence[Plateau]) -> list[Suspicion]:
     """Plateaus after the end of the recording, or at other times than the table's."""
     time = read_column(source.frames, "time")
     if not len(time):

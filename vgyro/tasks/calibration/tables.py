@@ -29,7 +29,7 @@ from vgyro.tasks.rates.reference_log import read_reference
 
 
 @dataclass(frozen=True)
-class Source:
+class RecordingSource:
     """A recording that the calibration may use, its frames, its sample rate, its logged reference if it has one."""
 
     recording: Recording
@@ -39,10 +39,10 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Test:
+class TableTest:
     """One recording on a rate table, analysed for the gyros of its axis; means in their order."""
 
-    source: Source
+    source: RecordingSource
     axis: str
     means: PlateauMeans
     fits: list[ScaleFit]
@@ -58,8 +58,8 @@ class Test:
 
 
 def fit_tests(
-    sources: list[Source], board: Board, latitude_deg: float | None, options: CalibrationOptions
-) -> tuple[list[Test], dict[str, str]]:
+    sources: list[RecordingSource], board: Board, latitude_deg: float | None, options: CalibrationOptions
+) -> tuple[list[TableTest], dict[str, str]]:
     """Every calibration recording that allows a fit, in order, and the others with the reason.
 
     raises : DataError if a gyro turns against its sign
@@ -80,7 +80,7 @@ def fit_tests(
         except TooShort as error:
             problems[source.recording.name] = error.what
             continue
-        tests.append(Test(source, axis, means, fits))
+        tests.append(TableTest(source, axis, means, fits))
     return tests, problems
 
 
@@ -89,7 +89,7 @@ def nominal_of(array: list[Gyro]) -> list[GyroNominal]:
     return [GyroNominal(g.name, g.scale, g.bias, g.sign, g.range_deg_s) for g in array]
 
 
-def read_means(source: Source, board: Board, array: list[Gyro], options: CalibrationOptions) -> PlateauMeans:
+def read_means(source: RecordingSource, board: Board, array: list[Gyro], options: CalibrationOptions) -> PlateauMeans:
     """Plateau means of some gyros of one recording.  raises : TooShort, DataError"""
     plateaus = list(plateaus_of(source, options))
     if not plateaus:
@@ -115,7 +115,7 @@ def read_means(source: Source, board: Board, array: list[Gyro], options: Calibra
     return replace(means[0], **together)
 
 
-def plateaus_of(source: Source, options: CalibrationOptions) -> Iterator[tuple[float, float, float]]:
+def plateaus_of(source: RecordingSource, options: CalibrationOptions) -> Iterator[tuple[float, float, float]]:
     """(start s, stop s, rate deg/s): as the manifest lists them, or found in the logged reference."""
     reference = source.recording.reference
     if isinstance(reference, PlateauReference):
@@ -127,7 +127,7 @@ def plateaus_of(source: Source, options: CalibrationOptions) -> Iterator[tuple[f
 
 
 def cross_axes(
-    tests: list[Test], board: Board, known: dict[str, ScaleFit], options: CalibrationOptions
+    tests: list[TableTest], board: Board, known: dict[str, ScaleFit], options: CalibrationOptions
 ) -> dict[str, Finding]:
     """Gyro → response to rotation about other axes; the larger one where two axes were turned about.
 

@@ -29,8 +29,8 @@ from vgyro.calibration.figures import VALUE
 from vgyro.config import CalibrationOptions, RestOptions
 from vgyro.errors import TooShort
 from vgyro.storage.tables import read_column
-from vgyro.tasks.calibration.tables import Source, Test
-from vgyro.tasks.rates.block_means import BlockMeans, between, block_means, thermometer_of
+from vgyro.tasks.calibration.tables import RecordingSource, TableTest
+from vgyro.tasks.rates.block_means import FrameMeans, between, block_means, thermometer_of
 from vgyro.tasks.rates.moves import moves_of
 from vgyro.units import parts_per_million
 
@@ -51,7 +51,7 @@ class Cycles:
     temperature: np.ndarray
 
     @classmethod
-    def of(cls, tests: Sequence[Test], gyro: str) -> Cycles:
+    def of(cls, tests: Sequence[TableTest], gyro: str) -> Cycles:
         """Of the tests about the gyro's axis."""
         fits = {test.name: fit for test in tests for fit in test.fits if fit.gyro == gyro and fit.source == "measured"}
         columns = [
@@ -81,8 +81,8 @@ class Cycles:
 class Rests:
     """Block means of the recordings at rest: of the first thermal one, and of the first static one; None: none."""
 
-    thermal: tuple[str, BlockMeans] | None
-    static: tuple[str, BlockMeans] | None
+    thermal: tuple[str, FrameMeans] | None
+    static: tuple[str, FrameMeans] | None
 
 
 @dataclass(frozen=True)
@@ -101,12 +101,12 @@ class Thermal:
     note: str = ""
 
 
-def read_rests(sources: Sequence[Source], board: Board, options: RestOptions) -> Rests:
+def read_rests(sources: Sequence[RecordingSource], board: Board, options: RestOptions) -> Rests:
     """Means of one second of everything that the recordings at rest say, without what moves in them.
 
     options : how motion is told from rest, in a recording whose rests are not listed
     """
-    found: dict[str, tuple[str, BlockMeans]] = {}
+    found: dict[str, tuple[str, FrameMeans]] = {}
     fields = [gyro.field for gyro in board.gyros] + [thermometer.field for thermometer in board.temperatures]
     for kind in ("thermal", "static"):
         source = next((source for source in sources if source.recording.kind == kind), None)
@@ -120,7 +120,9 @@ def read_rests(sources: Sequence[Source], board: Board, options: RestOptions) ->
     return Rests(found.get("thermal"), found.get("static"))
 
 
-def _at_rest(means: BlockMeans, source: Source, board: Board, rate_hz: float, options: RestOptions) -> BlockMeans:
+def _at_rest(
+    means: FrameMeans, source: RecordingSource, board: Board, rate_hz: float, options: RestOptions
+) -> FrameMeans:
     rest = source.recording.rest
     if rest == "auto":
         time = read_column(source.frames, "time")
@@ -133,10 +135,10 @@ def _at_rest(means: BlockMeans, source: Source, board: Board, rate_hz: float, op
         for start, stop in rest:
             inside |= (means.time >= start) & (means.time <= stop)
     values = {name: column[inside] for name, column in means.values.items()}
-    return BlockMeans(means.seconds, means.time[inside], means.segment[inside], values)
+    return FrameMeans(means.seconds, means.time[inside], means.segment[inside], values)
 
 
-def thermal_of(gyro: Gyro, board: Board, main: ScaleFit, tests: Sequence[Test], rests: Rests,
+def thermal_of(gyro: Gyro, board: Board, main: ScaleFit, tests: Sequence[TableTest], rests: Rests,
                options: CalibrationOptions) -> Thermal:  # fmt: skip
     """Everything of one gyro.  main : the fit whose scale and bias are used"""
     cycles = Cycles.of(tests, gyro.name)

@@ -15,7 +15,7 @@ from vgyro.fusion.design import information, q_for_bandwidth
 from vgyro.metrics import Sampling, allan_deviation, own_samples, without_outliers
 from vgyro.storage.tables import read_column, read_columns, read_metadata, read_rows, write_table
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.figures.crosscheck_rows import Row, columns_of, compare
+from vgyro.tasks.figures.crosscheck_rows import CrosscheckRow, columns_of, compare
 from vgyro.tasks.figures.crosscheck_windows import window_rows
 from vgyro.tasks.fusion.array_inputs import in_motion
 from vgyro.tasks.fusion.noise_record import read_noise
@@ -46,7 +46,7 @@ def main(task: Task) -> None:
     write_table(task.output("crosscheck"), columns_of(rows), "crosscheck", task.provenance())
 
 
-def filter_rows(task: Task, gyros: list[str]) -> Iterator[Row]:
+def filter_rows(task: Task, gyros: list[str]) -> Iterator[CrosscheckRow]:
     """The filters of Jiang et al. over the first samples, by filterpy: the sample that differs most."""
     columns = read_metadata(task.input("fused"))["units"]
     fusion = task.section("fusion", FusionOptions)
@@ -77,7 +77,7 @@ def _first_samples(task: Task, gyros: list[str]) -> np.ndarray:
     return np.column_stack([found[gyro][here] for gyro in gyros]).astype(float)
 
 
-def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterator[Row]:
+def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterator[CrosscheckRow]:
     """Some points of the overlapping Allan curves of a few series, by the definition.
 
     The definition knows of no lost sample: series with losses or outliers are computed again by the other engine.

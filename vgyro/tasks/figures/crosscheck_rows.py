@@ -9,7 +9,7 @@ import pyarrow as pa
 
 
 @dataclass(frozen=True)
-class Row:
+class CrosscheckRow:
     """A row of crosscheck.parquet; window -1: a whole recording."""
 
     check: str
@@ -33,7 +33,7 @@ def compare(
     theirs: np.ndarray | float,
     tolerance: float,
     unit: str,
-) -> Row:
+) -> CrosscheckRow:
     """Compare two figures, or of two arrays the elements that differ most; a NaN on one side does not pass."""
     first, second = np.ravel(ours).astype(float), np.ravel(theirs).astype(float)
     distance = np.abs(first - second)
@@ -43,7 +43,7 @@ def compare(
 
 def compare_maximum(
     check: str, against: str, window: int, series: str, ours: float, theirs: float, tolerance: float
-) -> Row:
+) -> CrosscheckRow:
     """Compare two maxima of one likelihood: ours may be greater, but not smaller by more than the tolerance."""
     return _row(check, against, window, series, (ours, theirs), tolerance, "1", two_sided=False)
 
@@ -51,15 +51,15 @@ def compare_maximum(
 def _row(
     check: str, against: str, window: int, series: str, pair: tuple[float, float], tolerance: float, unit: str,
     *, two_sided: bool,
-) -> Row:  # fmt: skip
+) -> CrosscheckRow:  # fmt: skip
     ours, theirs = float(pair[0]), float(pair[1])
     difference = ours - theirs
     passed = bool(abs(difference) <= tolerance if two_sided else difference >= -tolerance)
-    return Row(check, against, window, series, ours, theirs, difference, tolerance, unit, passed)
+    return CrosscheckRow(check, against, window, series, ours, theirs, difference, tolerance, unit, passed)
 
 
-def columns_of(rows: list[Row]) -> pa.Table:
+def columns_of(rows: list[CrosscheckRow]) -> pa.Table:
     """Rows → table; without rows, too, the columns have their types."""
     kinds = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
-    schema = pa.schema([(field.name, kinds[str(field.type)]) for field in fields(Row)])
+    schema = pa.schema([(field.name, kinds[str(field.type)]) for field in fields(CrosscheckRow)])
     return pa.Table.from_pylist([asdict(row) for row in rows], schema=schema)

@@ -17,7 +17,7 @@ from vgyro.engine.models import NOT_POSITIVE_DEFINITE, OUTLIER_DOMINATED
 from vgyro.engine.recursions import correlation_target, dcc_log_likelihood, garch_log_likelihood, garch_variance
 from vgyro.storage.tables import read_metadata, read_rows
 from vgyro.tasks.common import Task
-from vgyro.tasks.figures.crosscheck_rows import Row, compare, compare_maximum
+from vgyro.tasks.figures.crosscheck_rows import CrosscheckRow, compare, compare_maximum
 from vgyro.tasks.volatility.stored import ArraySeries, open_series, stored_model
 from vgyro.volatility.check import covariance_after, greatest_log_likelihood
 from vgyro.volatility.rolling import WindowModels, rows_needed, weights_of_windows
@@ -52,7 +52,7 @@ class Fitted:
         return "native" if self.array.engine == "reference" else "reference"
 
 
-def window_rows(task: Task, count: int, rng: np.random.Generator) -> Iterator[Row]:
+def window_rows(task: Task, count: int, rng: np.random.Generator) -> Iterator[CrosscheckRow]:
     """Compare `count` random windows, of all definitions of r_t."""
     fitted = [_fitted(task, path) for path in sorted(task.inputs.get("garch", []))]
     first = np.cumsum([0, *(len(one.array.plan) for one in fitted)])
@@ -83,7 +83,7 @@ def _fitted(task: Task, garch: Path) -> Fitted:
     return Fitted(array, garch, places["dcc"][folder], places["weights"][folder])
 
 
-def garch_rows(one: Fitted, number: int, r: np.ndarray) -> Iterator[Row]:
+def garch_rows(one: Fitted, number: int, r: np.ndarray) -> Iterator[CrosscheckRow]:
     """Each gyro's likelihood at our parameters: as stored, and against the greatest that others find."""
     n, definition = len(one.array.gyros), one.array.definition
     names = ["omega", "alpha", "beta", "log_likelihood", "status"]
@@ -105,7 +105,9 @@ def garch_rows(one: Fitted, number: int, r: np.ndarray) -> Iterator[Row]:
         yield compare_maximum(check, GRID, *about, greatest_log_likelihood(e[:, place]), tolerance)
 
 
-def dcc_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels, gyros: np.ndarray) -> Iterator[Row]:
+def dcc_rows(
+    one: Fitted, number: int, r: np.ndarray, model: WindowModels, gyros: np.ndarray
+) -> Iterator[CrosscheckRow]:
     """The correlation likelihood at our (a, b), given our margins: as stored, and against the other's maximum."""
     stored = read_rows(one.dcc, ["a", "b", "log_likelihood", "status"], number + 1, number + 2)
     a, b = float(stored["a"][0]), float(stored["b"][0])
@@ -126,7 +128,7 @@ def dcc_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels, gyros
     )  # fmt: skip
 
 
-def weight_rows(one: Fitted, number: int, model: WindowModels) -> Iterator[Row]:
+def weight_rows(one: Fitted, number: int, model: WindowModels) -> Iterator[CrosscheckRow]:
     """The weights of every sample that is this window's, from the stored parameters by the other engine."""
     array = one.array
     needed = rows_needed(model, array.plan.runs, array.options.step)
@@ -147,7 +149,7 @@ def weight_rows(one: Fitted, number: int, model: WindowModels) -> Iterator[Row]:
             yield compare(check, against, number, series, ours, theirs.weights, WEIGHT_TOLERANCE, "1")
 
 
-def loop_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels) -> Iterator[Row]:
+def loop_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels) -> Iterator[CrosscheckRow]:
     """Weights of the last sample of a window (in-sample) and of the first one after it (causal), by plain loops."""
     array = one.array
     window, gyros = array.window(number), np.isfinite(model.omega[0])

@@ -33,7 +33,7 @@ from vgyro.metrics.figures import without_interpolation
 from vgyro.storage.tables import read_column, read_columns, read_metadata
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.figures.missing import Lacking, own_moving, own_still, with_own
-from vgyro.tasks.figures.tables import Results, Rows, Series, write_results
+from vgyro.tasks.figures.tables import FigureRows, MeasuredSeries, Results, write_results
 from vgyro.tasks.rates.rates_file import DEVIATION, ArrayFile, FileColumns, read_frame
 
 SECTIONS = ("board", "engine", "metrics")
@@ -69,18 +69,18 @@ def main(task: Task) -> None:
     frame = read_frame(rates, gyros, axis)
     lacking = Lacking.of(rates, gyros, frame, options.most_lost_s)
     gyros = lacking.gyros
-    series = [Series(rates, gyro, gyro, "", LowPass()) for gyro in gyros]
+    series = [MeasuredSeries(rates, gyro, gyro, "", LowPass()) for gyro in gyros]
     series += fused_series(task.input("fused"), read_columns(task.input("methods")))
     reference = frame.reference
     still = still_figures(task, frame, reference, series, lacking, options)
-    rows = [] if still is None else [Rows(series, still.figures.readings, still.true_rate)]
+    rows = [] if still is None else [FigureRows(series, still.figures.readings, still.true_rate)]
     if reference is not None:
         columns, sampling = columns_of(series, held=lacking.filled), frame.sampling(options.most_lost_s)
         own = {place: own_moving(lacking.own(rates, place), reference, sampling, options) for place in lacking.places}
         moving = dynamic_figures(
             columns, reference, frame.rate_hz, frame.segment, len(gyros), options, sampling, deviations_of(series), own
         )
-        rows = with_dynamic(rows, Rows(series, moving, 0.0))
+        rows = with_dynamic(rows, FigureRows(series, moving, 0.0))
     if still is not None and still.true_rate == 0:
         rows += moved_figures(task.input("moved"), series, len(gyros), still)
     figures = None if still is None else still.figures
@@ -92,7 +92,7 @@ def main(task: Task) -> None:
 
 
 def columns_of(
-    series: Sequence[Series],
+    series: Sequence[MeasuredSeries],
     where: np.ndarray | None = None,
     less: float | np.ndarray = 0.0,
     held: Mapping[tuple[Path, str], np.ndarray] | None = None,
@@ -101,7 +101,7 @@ def columns_of(
     return FileColumns([(one.path, one.column) for one in series], where, less, held=held or {})
 
 
-def deviations_of(series: Sequence[Series]) -> Callable[[int], np.ndarray | None]:
+def deviations_of(series: Sequence[MeasuredSeries]) -> Callable[[int], np.ndarray | None]:
     """Place of a series → its posterior standard deviation [T], deg/s, read when it is asked for; None: it has none."""
     names = {path: set(pq.read_schema(path).names) for path in {one.path for one in series}}
 
@@ -113,7 +113,7 @@ def deviations_of(series: Sequence[Series]) -> Callable[[int], np.ndarray | None
     return of
 
 
-def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]:
+def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[MeasuredSeries]:
     """The columns of fused.parquet, by methods.parquet; a method that could not run has none."""
     found = []
     for row, column in enumerate(methods["column"]):
@@ -125,7 +125,7 @@ def fused_series(fused: Path, methods: Mapping[str, np.ndarray]) -> list[Series]
                 int(methods["passes"][row]),
             )
             method, definition = str(methods["method"][row]), str(methods["definition"][row] or "")
-            found.append(Series(fused, str(column), method, definition, low_pass))
+            found.append(MeasuredSeries(fused, str(column), method, definition, low_pass))
     return found
 
 
@@ -133,7 +133,7 @@ def still_figures(
     task: Task,
     frame: ArrayFile,
     reference: np.ndarray | None,
-    series: list[Series],
+    series: list[MeasuredSeries],
     lacking: Lacking,
     options: MetricsOptions,
 ) -> Still | None:
@@ -178,7 +178,7 @@ def still_figures(
     return Still(true_rate, where, shared, measured, own, figures)
 
 
-def with_dynamic(still: list[Rows], moving: Rows) -> list[Rows]:
+def with_dynamic(still: list[FigureRows], moving: FigureRows) -> list[FigureRows]:
     """Dynamic figures beside static ones; those of the same true rate go into the same rows."""
     if still and still[0].true_rate == moving.true_rate:
         readings = [{**rest, **row} for rest, row in zip(still[0].readings, moving.readings, strict=True)]
@@ -186,7 +186,7 @@ def with_dynamic(still: list[Rows], moving: Rows) -> list[Rows]:
     return [*still, moving]
 
 
-def moved_figures(path: Path, series: list[Series], singles: int, still: Still) -> list[Rows]:
+def moved_figures(path: Path, series: list[MeasuredSeries], singles: int, still: Still) -> list[FigureRows]:
     """Static figures of the methods that a constant rate changes; the errors of the gyros are the same with it."""
     rate = read_metadata(path).get("injected_rate")
     names = [name for name in pq.read_schema(path).names if name not in HEAD]
@@ -196,7 +196,7 @@ def moved_figures(path: Path, series: list[Series], singles: int, still: Still) 
     columns = columns_of(moved, still.where)
     own = [still.shared.measure(values, one.low_pass) for values, one in zip(columns, moved, strict=True)]
     found = array_figures(still.shared, [*still.measured[:singles], *own], singles, still.own)
-    return [Rows(moved, found.readings[singles:], float(rate))]
+    return [FigureRows(moved, found.readings[singles:], float(rate))]
 
 
 def noise_correlation(

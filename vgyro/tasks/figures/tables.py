@@ -27,7 +27,7 @@ NUMBERS = ("true_rate", "value", "low", "high")
 
 
 @dataclass(frozen=True)
-class Series:
+class MeasuredSeries:
     """One column to measure: its file and name there, what metrics.parquet calls it, and what it went through."""
 
     path: Path
@@ -38,10 +38,10 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Rows:
+class FigureRows:
     """Figures by name of each series, at one true rate, deg/s."""
 
-    series: list[Series]
+    series: list[MeasuredSeries]
     readings: list[dict[str, Reading]]
     true_rate: float
 
@@ -53,9 +53,9 @@ class Results:
     singles : the first so many series are gyros;  static : None where nothing rests;  of : what `correlation` is of
     """
 
-    series: list[Series]
+    series: list[MeasuredSeries]
     singles: int
-    rows: list[Rows]
+    rows: list[FigureRows]
     static: StaticFigures | None
     correlation: Correlation
     of: str
@@ -94,7 +94,7 @@ def write_results(task: Task, found: Results, confidence: float) -> None:
     )
 
 
-def metric_columns(task: Task, found: list[Rows]) -> dict[str, np.ndarray]:
+def metric_columns(task: Task, found: list[FigureRows]) -> dict[str, np.ndarray]:
     """metrics.parquet, long: one row a true rate, series and figure, in the order of FIGURES."""
     rows = [
         (

@@ -25,7 +25,7 @@ NOT_READ = ("fused", "moved", "series")
 RESULTS = "results"
 
 
-class Place(NamedTuple):
+class ArtefactPlace(NamedTuple):
     """Where an artefact belongs. axis, definition : empty where the artefact is above them;  table : rates, garch, …"""
 
     recording: str
@@ -34,13 +34,13 @@ class Place(NamedTuple):
     table: str
 
 
-def place_of(path: Path, dataset: str) -> Place:
+def place_of(path: Path, dataset: str) -> ArtefactPlace:
     """Read results/<dataset>/<recording>[/<axis>[/<definition>]]/<table>.parquet.  raises : ValueError"""
     folders = inside(path, dataset).parts[:-1]
     if not 1 <= len(folders) <= 3:
         raise ValueError(f"{path} is not at results/<dataset>/<recording>[/<axis>[/<definition>]]")
     recording, axis, definition = (*folders, "", "")[:3]
-    return Place(recording, axis, definition, path.stem)
+    return ArtefactPlace(recording, axis, definition, path.stem)
 
 
 def inside(path: Path, dataset: str) -> Path:
@@ -92,13 +92,13 @@ def read_dataset_part(task: Task) -> DatasetPart:
     )
 
 
-def rates_of(placed: dict[Place, Path], recording: str, board: Board) -> RatesPart | None:
+def rates_of(placed: dict[ArtefactPlace, Path], recording: str, board: Board) -> RatesPart | None:
     """Rates of a recording; None where it has none."""
-    path = placed.get(Place(recording, "", "", "rates"))
+    path = placed.get(ArtefactPlace(recording, "", "", "rates"))
     return None if path is None else read_rates(path, [gyro.name for gyro in board.gyros])
 
 
-def read_arrays(placed: dict[Place, Path], recording: str, kind: str, board: Board) -> tuple[ArrayPart, ...]:
+def read_arrays(placed: dict[ArtefactPlace, Path], recording: str, kind: str, board: Board) -> tuple[ArrayPart, ...]:
     """The arrays of a recording that have artefacts, in the board's order."""
     arrays = []
     for axis in board.axes:
@@ -118,7 +118,7 @@ def read_arrays(placed: dict[Place, Path], recording: str, kind: str, board: Boa
     return tuple(arrays)
 
 
-def read_sources(task: Task, placed: dict[Place, Path]) -> dict[str, Record]:
+def read_sources(task: Task, placed: dict[ArtefactPlace, Path]) -> dict[str, Record]:
     """Path from the data set's folder → metadata of each artefact."""
     dataset = task.option("dataset")
     sources: dict[str, Record] = {}

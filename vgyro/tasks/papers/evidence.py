@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from vgyro.board import Board
 from vgyro.config import MetricsOptions, VolatilityOptions
 from vgyro.dataset import ConstantReference, Manifest
-from vgyro.papers import Evidence, with_single
+from vgyro.papers import PaperEvidence, with_single
 from vgyro.papers.beside import CASE_RATE
 from vgyro.papers.series import Name, extremes, paired_ratios, series_figures
 from vgyro.storage.tables import read_columns, read_metadata
@@ -47,7 +47,7 @@ def gather(
     metrics: MetricsOptions,
     slow_series: bool,
     rivals: Sequence[Name] = (),
-) -> Evidence:
+) -> PaperEvidence:
     """Evidence of one twin from all its artefacts.
 
     paths : files under …/<recording>/[<axis>/[<definition>/]]<table>.parquet; tables that no cell needs are passed over
@@ -68,7 +68,7 @@ def gather(
         for suffix, found in _slow_rows(static, gyros, volatility, metrics, rivals):
             for name, part in found.items():
                 rows.setdefault(f"{name}{suffix}", []).extend(part)
-    return Evidence(rows, gyros)
+    return PaperEvidence(rows, gyros)
 
 
 def at_added_rate(rows: Rows, manifest: Manifest) -> Rows:

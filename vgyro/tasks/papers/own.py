@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from markupsafe import Markup
 
-from vgyro.papers.beside import Compared, Standing
+from vgyro.papers.beside import ComparedMethod, Standing
 from vgyro.papers.compare import OWN
 from vgyro.papers.published import PublishedTable
 from vgyro.report import html, numbers, tables
@@ -29,7 +29,7 @@ LEGEND = (
 )
 
 
-def own_counts(beside: Mapping[int | str, Sequence[Compared]]) -> list[tuple[str, str]]:
+def own_counts(beside: Mapping[int | str, Sequence[ComparedMethod]]) -> list[tuple[str, str]]:
     """(method of ours, how often it is better, undecided, worse), over all tables."""
     every = [one for part in beside.values() for one in part if one.own]
     found = []
@@ -46,19 +46,19 @@ def own_counts(beside: Mapping[int | str, Sequence[Compared]]) -> list[tuple[str
     return found
 
 
-def own_methods(table: PublishedTable, compared: Sequence[Compared]) -> Markup:
+def own_methods(table: PublishedTable, compared: Sequence[ComparedMethod]) -> Markup:
     """Table of ours and of the paper's methods, case by case; nothing where none is asked for."""
     if not compared or table.beside is None:
         return Markup()
     notes = tables.Notes()
     figures = list(dict.fromkeys((one.figure, one.unit) for one in compared))
-    columns = [tables.Column("", numeric=False), *(tables.Column(name, unit) for name, unit in figures)]
+    columns = [tables.TableColumn("", numeric=False), *(tables.TableColumn(name, unit) for name, unit in figures)]
     best = {(one.case, one.over, one.figure) for one in compared if one.over}
-    rows: list[tables.Row] = []
+    rows: list[tables.TableRow] = []
     for case in dict.fromkeys(one.case for one in compared):
         for own, title in ((True, "vgyro's own"), (False, "methods of the paper, on the same board")):
             part = [one for one in compared if one.case == case and one.own == own]
-            rows.append(tables.Row(heading=", ".join(filter(None, (title, case)))))
+            rows.append(tables.TableRow(heading=", ".join(filter(None, (title, case)))))
             for method in dict.fromkeys(one.method for one in part):
                 rows += _lines([one for one in part if one.method == method], notes, best)
     return html.join(
@@ -72,17 +72,20 @@ def own_methods(table: PublishedTable, compared: Sequence[Compared]) -> Markup:
 
 
 def _lines(
-    of_method: Sequence[Compared], notes: tables.Notes, best: Collection[tuple[str, str, str]]
-) -> list[tables.Row]:
+    of_method: Sequence[ComparedMethod], notes: tables.Notes, best: Collection[tuple[str, str, str]]
+) -> list[tables.TableRow]:
     """The figures of one method and, of ours, the ratios below them.  best : case, method, figure"""
     marked = [(one, (one.case, one.method, one.figure) in best and not one.own) for one in of_method]
-    first = tables.Row((tables.Cell(of_method[0].method), *(_figure(one, least, notes) for one, least in marked)))
+    first = tables.TableRow((tables.Cell(of_method[0].method), *(_figure(one, least, notes) for one, least in marked)))
     if not any(one.over for one in of_method):
         return [first]
-    return [first, tables.Row((tables.Cell("ratio to the paper's best"), *(_ratio(one, notes) for one in of_method)))]
+    return [
+        first,
+        tables.TableRow((tables.Cell("ratio to the paper's best"), *(_ratio(one, notes) for one in of_method))),
+    ]
 
 
-def _figure(one: Compared, least: bool, notes: tables.Notes) -> tables.Cell:
+def _figure(one: ComparedMethod, least: bool, notes: tables.Notes) -> tables.Cell:
     if not one.value.known:
         return tables.Cell(numbers.MISSING, tone="muted", notes=notes.number(one.value.reason), hint=one.value.source)
     tone: tables.Tone = TONES[one.standing] if one.own and not one.over else "best" if least else ""
@@ -93,7 +96,7 @@ def _figure(one: Compared, least: bool, notes: tables.Notes) -> tables.Cell:
     return tables.number_cell(value.value, value.low, value.high, tone=tone, notes=said, hint=hint)
 
 
-def _ratio(one: Compared, notes: tables.Notes) -> tables.Cell:
+def _ratio(one: ComparedMethod, notes: tables.Notes) -> tables.Cell:
     if not one.over:
         return tables.Cell("")
     if not one.ratio.known:

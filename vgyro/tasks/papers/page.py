@@ -8,8 +8,8 @@ from markupsafe import Markup
 
 from vgyro.dataset import Manifest
 from vgyro.papers import Claim, Comparison, Paper, Verdict
-from vgyro.papers.beside import Compared
-from vgyro.papers.compare import Agreement, Cell
+from vgyro.papers.beside import ComparedMethod
+from vgyro.papers.compare import Agreement, ComparedCell
 from vgyro.papers.published import Heading
 from vgyro.report import html, numbers, tables
 from vgyro.report.page import Section, render_page
@@ -38,7 +38,7 @@ def paper_page(
     comparisons: Sequence[Comparison],
     verdicts: Sequence[tuple[Claim, Verdict]],
     plots: Markup,
-    beside: Mapping[int | str, Sequence[Compared]],
+    beside: Mapping[int | str, Sequence[ComparedMethod]],
 ) -> str:
     """A whole page as text; the same inputs give the same bytes.
 
@@ -66,7 +66,7 @@ def _title(comparison: Comparison) -> str:
     return table.title if table.number == "text" else f"Table {table.number}: {table.title}"
 
 
-def _beside(part: Comparison, beside: Mapping[int | str, Sequence[Compared]]) -> Markup:
+def _beside(part: Comparison, beside: Mapping[int | str, Sequence[ComparedMethod]]) -> Markup:
     return own_methods(part.table, beside.get(part.table.number, ()))
 
 
@@ -74,7 +74,7 @@ def _what(
     paper: Paper,
     comparisons: Sequence[Comparison],
     verdicts: Sequence[tuple[Claim, Verdict]],
-    beside: Mapping[int | str, Sequence[Compared]],
+    beside: Mapping[int | str, Sequence[ComparedMethod]],
 ) -> Markup:
     firsts = [
         readings[0]
@@ -97,7 +97,7 @@ def _what(
         )),
         html.paragraph(LEGEND, "note"),
         tables.render_table(
-            [tables.Column(title, numeric=False) for title in ("setting", "printed", "twin")],
+            [tables.TableColumn(title, numeric=False) for title in ("setting", "printed", "twin")],
             [[entry.name, entry.printed, entry.twin] for entry in paper.settings],
             "Settings",
         ),
@@ -108,36 +108,41 @@ def _table(comparison: Comparison) -> Markup:
     """One block of lines a printed row: published, ours in each reading, implied."""
     table, notes = comparison.table, tables.Notes()
     columns = (*table.columns, *table.extra_columns)
-    rows: list[tables.Row] = []
+    rows: list[tables.TableRow] = []
     for row in (*table.rows, *table.extra_rows):
         rows.append(
-            tables.Row(heading=f"{row.name}{_unit(row.unit)}{f' ({EXTRA})' if row in table.extra_rows else ''}")
+            tables.TableRow(heading=f"{row.name}{_unit(row.unit)}{f' ({EXTRA})' if row in table.extra_rows else ''}")
         )
         rows += _lines(comparison, row, columns, notes)
     heads = (
-        tables.Column("", numeric=False),
-        *(tables.Column(column.name, _unit(column.unit or table.unit).removeprefix(", ")) for column in table.columns),
-        *(tables.Column(column.name, EXTRA) for column in table.extra_columns),
+        tables.TableColumn("", numeric=False),
+        *(
+            tables.TableColumn(column.name, _unit(column.unit or table.unit).removeprefix(", "))
+            for column in table.columns
+        ),
+        *(tables.TableColumn(column.name, EXTRA) for column in table.extra_columns),
     )
     parts = [tables.render_table(heads, rows, f"{table.where} of the paper", notes.texts, compact=True)]
     return html.join(*parts, html.paragraph(table.note, "note") if table.note else "")
 
 
-def _lines(comparison: Comparison, row: Heading, columns: Sequence[Heading], notes: tables.Notes) -> list[tables.Row]:
+def _lines(
+    comparison: Comparison, row: Heading, columns: Sequence[Heading], notes: tables.Notes
+) -> list[tables.TableRow]:
     readings = [comparison.at(row.name, column.name) for column in columns]
     lines = []
     if any(cells and cells[0].published is not None for cells in readings):
         printed = [tables.Cell(cells[0].published or "") if cells else tables.Cell("") for cells in readings]
-        lines.append(tables.Row((tables.Cell("published"), *printed)))
+        lines.append(tables.TableRow((tables.Cell("published"), *printed)))
     for variant in dict.fromkeys(cell.variant for cells in readings for cell in cells):
         ours = [_ours(cells, variant, notes) for cells in readings]
-        lines.append(tables.Row((tables.Cell("simulated", variant), *ours)))
+        lines.append(tables.TableRow((tables.Cell("simulated", variant), *ours)))
     if any(cells and cells[0].implied and cells[0].implied.value is not None for cells in readings):
-        lines.append(tables.Row((tables.Cell("implied"), *(_implied(cells, notes) for cells in readings))))
+        lines.append(tables.TableRow((tables.Cell("implied"), *(_implied(cells, notes) for cells in readings))))
     return lines
 
 
-def _ours(cells: Sequence[Cell], variant: str, notes: tables.Notes) -> tables.Cell:
+def _ours(cells: Sequence[ComparedCell], variant: str, notes: tables.Notes) -> tables.Cell:
     cell = next((cell for cell in cells if cell.variant == variant), None)
     if cell is None:
         return tables.Cell("")
@@ -149,7 +154,7 @@ def _ours(cells: Sequence[Cell], variant: str, notes: tables.Notes) -> tables.Ce
     return tables.number_cell(cell.ours.value, cell.ours.low, cell.ours.high, tone=TONES[cell.agreement], hint=hint)
 
 
-def _implied(cells: Sequence[Cell], notes: tables.Notes) -> tables.Cell:
+def _implied(cells: Sequence[ComparedCell], notes: tables.Notes) -> tables.Cell:
     if not cells or cells[0].implied is None:
         return tables.Cell("")
     value, how = cells[0].implied.value, cells[0].implied.how
@@ -159,7 +164,7 @@ def _implied(cells: Sequence[Cell], notes: tables.Notes) -> tables.Cell:
     return tables.Cell(text, notes=notes.number(how))
 
 
-def _is_probability(cell: Cell) -> bool:
+def _is_probability(cell: ComparedCell) -> bool:
     return "P-" in cell.column or "P-" in cell.row
 
 
@@ -183,12 +188,14 @@ def _claims(verdicts: Sequence[tuple[Claim, Verdict]]) -> Markup:
             "Each claim is decided by a rule on figures. A figure with limits decides only if both lie on one side of "
             "the bound. A verdict says what the equations and the simulated board show, not what the real board did."
         ),
-        tables.render_table([tables.Column(title, numeric=False, wide=title == "reason") for title in titles], rows),
+        tables.render_table(
+            [tables.TableColumn(title, numeric=False, wide=title == "reason") for title in titles], rows
+        ),
     )
 
 
 def _twin(paper: Paper, manifest: Manifest) -> Markup:
-    columns = [tables.Column(title, numeric=False) for title in ("recording", "kind", "rate")]
+    columns = [tables.TableColumn(title, numeric=False) for title in ("recording", "kind", "rate")]
     rows = [
         [recording.name, recording.kind, f"{recording.rate_hz:g} Hz" if recording.rate_hz else "the board's"]
         for recording in manifest.recordings

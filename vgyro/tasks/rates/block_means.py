@@ -15,7 +15,7 @@ HALF = 0.5
 
 
 @dataclass(frozen=True)
-class BlockMeans:
+class FrameMeans:
     """Means of blocks that lie within one gap-free segment each.
 
     seconds : length of a block;  time [M] : mean time of its samples, s;  segment [M];  values : column → [M]
@@ -29,7 +29,7 @@ class BlockMeans:
 
 def block_means(
     frames: Path, columns: list[str], seconds: float = 1.0, rails: Mapping[str, tuple[float, float]] | None = None
-) -> BlockMeans:
+) -> FrameMeans:
     """Means of blocks of `seconds` of the recording's clock; the memory is that of a row group and of the means.
 
     rails : column → counts at which the converter clips; a block with a clipped sample is NaN there
@@ -51,7 +51,7 @@ def block_means(
     samples = table[0]
     kept = samples >= HALF * (np.median(samples) if samples.size else 0.0)
     values = {name: table[3 + index][kept] for index, name in enumerate(names)}
-    return BlockMeans(seconds, table[1][kept], table[2][kept].astype(np.int64), values)
+    return FrameMeans(seconds, table[1][kept], table[2][kept].astype(np.int64), values)
 
 
 def _hide_clipped(columns: dict[str, np.ndarray], rails: Mapping[str, tuple[float, float]]) -> None:

@@ -30,7 +30,7 @@ FEWEST_GYROS = 2
 
 
 @dataclass(frozen=True)
-class Row:
+class BekkRow:
     """A row of bekk.parquet."""
 
     window: int
@@ -77,7 +77,7 @@ def main(task: Task) -> None:
     Each definition has the same windows, those with a whole step after them first.
     """
     options = task.section("crosscheck", CrossCheckOptions)
-    rows: list[Row] = []
+    rows: list[BekkRow] = []
     dcc = {path.parent.name: path for path in task.inputs.get("dcc", [])}
     for garch in task.inputs.get("garch", []):
         definition = garch.parent.name
@@ -99,7 +99,7 @@ def chosen_windows(array: ArraySeries, count: int, seed: int) -> list[int]:
     return sorted(found.tolist())
 
 
-def window_rows(array: ArraySeries, garch: Path, dcc: Path, number: int) -> Iterator[Row]:
+def window_rows(array: ArraySeries, garch: Path, dcc: Path, number: int) -> Iterator[BekkRow]:
     """A row a model of one window; none where fewer than two gyros have a GARCH model."""
     sample = read_sample(array, garch, dcc, number)
     if sample.gyros.sum() < FEWEST_GYROS:
@@ -135,7 +135,7 @@ def read_sample(array: ArraySeries, garch: Path, dcc: Path, number: int) -> Samp
     )  # fmt: skip
 
 
-def engine_rows(array: ArraySeries, sample: Sample, dcc: Path, number: int) -> Iterator[Row]:
+def engine_rows(array: ArraySeries, sample: Sample, dcc: Path, number: int) -> Iterator[BekkRow]:
     """CCC and DCC, as they are stored: the margins' log-likelihoods and that of the correlation."""
     n = int(sample.gyros.sum())
     stored = read_rows(dcc, ["log_likelihood", "log_likelihood_ccc", "status"], number + 1, number + 2)
@@ -179,18 +179,18 @@ def _fused(sample: Sample, weights: np.ndarray) -> float:
 
 def _row(
     array: ArraySeries, sample: Sample, model: str, parameters: int, likelihood: float, sigma: float, status: str
-) -> Row:
+) -> BekkRow:
     bic = parameters * math.log(sample.inside) - 2 * likelihood
-    return Row(
+    return BekkRow(
         **sample.place, definition=str(array.definition), model=model, parameters=parameters,
         log_likelihood=likelihood, bic=bic, sigma=sigma, status=status,
     )  # fmt: skip
 
 
-def table_of(rows: list[Row]) -> pa.Table:
+def table_of(rows: list[BekkRow]) -> pa.Table:
     """Rows → table; without rows, too, the columns have their types."""
     kinds = {"str": pa.string(), "int": pa.int64(), "float": pa.float64()}
-    schema = pa.schema([(field.name, kinds[str(field.type)]) for field in fields(Row)])
+    schema = pa.schema([(field.name, kinds[str(field.type)]) for field in fields(BekkRow)])
     return pa.Table.from_pylist([asdict(row) for row in rows], schema=schema)
 
 

@@ -12,7 +12,7 @@ from vgyro.config import MetricsOptions
 from vgyro.storage.tables import read_columns, read_metadata, read_rows, write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.volatility.stored import WHOLE, open_series
-from vgyro.volatility.effects.kinds import Garch, RateTone, Sampled
+from vgyro.volatility.effects.kinds import GarchEffect, RateTone, Sampled
 from vgyro.volatility.effects.verdicts import Effect, explain_array
 
 SECTIONS = ("board", "engine", "volatility", "metrics")
@@ -47,14 +47,14 @@ def read_tones(task: Task) -> dict[str, list[RateTone]]:
     return found
 
 
-def read_garch(task: Task, gyros: int) -> dict[str, Garch]:
+def read_garch(task: Task, gyros: int) -> dict[str, GarchEffect]:
     """Gyro → GARCH(1,1) of the longest stretch; none if the level is not analysed."""
     if not task.inputs.get("garch"):
         return {}
     rows = read_rows(task.input("garch"), ["window", "gyro", "omega", "alpha", "beta"], 0, gyros)
     if not np.all(rows["window"] == WHOLE):
         raise ValueError(f"the first rows of {task.input('garch')} are not the longest stretch")
-    return {str(gyro): Garch(*(float(rows[name][row]) for name in ("omega", "alpha", "beta")))
+    return {str(gyro): GarchEffect(*(float(rows[name][row]) for name in ("omega", "alpha", "beta")))
             for row, gyro in enumerate(rows["gyro"])}  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vgyro.errors import TooShort
 from vgyro.volatility.arch_lm import arch_lm, kurtosis
-from vgyro.volatility.effects.whiten import FEWEST_SAMPLES, Line, Whitened, block_gain, usual_size, whiten
+from vgyro.volatility.effects.whiten import FEWEST_SAMPLES, SeriesLine, Whitened, block_gain, usual_size, whiten
 from vgyro.volatility.garch import garch_variance
 from vgyro.volatility.series import detrended
 
@@ -39,7 +39,7 @@ class RateTone:
 
 
 @dataclass(frozen=True)
-class Garch:
+class GarchEffect:
     """GARCH(1,1) of the series, as fitted."""
 
     omega: float
@@ -87,7 +87,7 @@ class Episode:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class EffectEvidence:
     """What the tests say of one gyro; a statistic and its p-value are pairs, NaN where there is none.
 
     level, detrended, whitened, standardised : ARCH-LM of the four series
@@ -132,8 +132,8 @@ class Evidence:
 
 
 def gather_evidence(
-    series: np.ndarray, sampled: Sampled, span: int, lags: int, tones: Sequence[RateTone], garch: Garch | None
-) -> Evidence | None:
+    series: np.ndarray, sampled: Sampled, span: int, lags: int, tones: Sequence[RateTone], garch: GarchEffect | None
+) -> EffectEvidence | None:
     """Test one series [T] deg/s of one stretch; None if it does not vary, lacks values, or has less than 50.
 
     span : samples of the running mean and median;  lags : of ARCH-LM;  tones : of the rate;  garch : its model, or None
@@ -171,7 +171,7 @@ def gather_evidence(
     noise = _Noise(float(np.mean(np.square(rest))), tails, _long_run(rest, residual, parts.autoregression), len(series))
     drift = _drift(parts, rest, noise, span) if level[1] < LEVEL_LEVEL else None
     standard, standard_long = _standardised(series, garch, lags)
-    return Evidence(
+    return EffectEvidence(
         lags, level, loose, _test(parts.residual, lags), standard, standard_long,
         _test(residual, lags, calm), _test(residual, LONG_LAGS, calm),
         _attract(residual, lags, calm), _attract(residual, LONG_LAGS, calm),
@@ -213,7 +213,7 @@ def _attract(series: np.ndarray, lags: int, keep: np.ndarray) -> bool:
     return sum(float(away[lag:] @ away[:-lag]) for lag in range(1, lags + 1)) > 0
 
 
-def _standardised(series: np.ndarray, garch: Garch | None, lags: int) -> tuple[tuple[float, float], ...]:
+def _standardised(series: np.ndarray, garch: GarchEffect | None, lags: int) -> tuple[tuple[float, float], ...]:
     """ARCH-LM of the series over its GARCH model's deviation, with few and with many lags."""
     if garch is None or not math.isfinite(garch.omega):
         return (math.nan, math.nan), (math.nan, math.nan)
@@ -293,7 +293,7 @@ def _tone(
     return SeenTone(tone.frequency, tone.amplitude, alias(tone.frequency, sampled.rate_hz), seen, True, share, math.nan)
 
 
-def _source(line: Line, sampled: Sampled, tones: Sequence[RateTone]) -> RateTone | None:
+def _source(line: SeriesLine, sampled: Sampled, tones: Sequence[RateTone]) -> RateTone | None:
     """The tone of the rate that a line of the series is: at the same place, aliased, and nearest in amplitude."""
     ratios = [
         (abs(math.log(max(tone.amplitude * _gain(tone, sampled), 1e-300) / line.amplitude)), place)

@@ -14,9 +14,9 @@ from vgyro.volatility.effects.kinds import (
     LONG_LAGS,
     MODEL_LEVEL,
     PAUSE_S,
+    EffectEvidence,
     Episode,
-    Evidence,
-    Garch,
+    GarchEffect,
     RateTone,
     Sampled,
     SeenTone,
@@ -50,7 +50,7 @@ def explain_array(
     span: int,
     lags: int,
     tones: Mapping[str, Sequence[RateTone]],
-    garch: Mapping[str, Garch],
+    garch: Mapping[str, GarchEffect],
 ) -> list[Effect]:
     """What the ARCH effect of each gyro's level is, by the rules of vgyro.volatility.effects.kinds.gather_evidence.
 
@@ -76,7 +76,7 @@ def explain_array(
     ]
 
 
-def verdict_of(evidence: Evidence) -> str:
+def verdict_of(evidence: EffectEvidence) -> str:
     """The verdict in words."""
     words = []
     if evidence.heteroskedastic:
@@ -93,7 +93,11 @@ def verdict_of(evidence: Evidence) -> str:
 
 
 def _effect(
-    gyro: str, evidence: Evidence, others: Sequence[Evidence | None], sampled: Sampled, garch: Garch | None
+    gyro: str,
+    evidence: EffectEvidence,
+    others: Sequence[EffectEvidence | None],
+    sampled: Sampled,
+    garch: GarchEffect | None,
 ) -> Effect:
     tone = evidence.tone
     return Effect(
@@ -113,7 +117,9 @@ def _no_verdict(gyro: str, series: np.ndarray) -> Effect:
     return Effect(gyro, why, f"No verdict: {len(series)} samples without a gap are too few.")
 
 
-def _sentence(evidence: Evidence, others: Sequence[Evidence | None], sampled: Sampled, garch: Garch | None) -> str:
+def _sentence(
+    evidence: EffectEvidence, others: Sequence[EffectEvidence | None], sampled: Sampled, garch: GarchEffect | None
+) -> str:
     """The verdict with its evidence, in one sentence."""
     clauses = []
     if evidence.heteroskedastic:
@@ -142,7 +148,7 @@ def _sentence(evidence: Evidence, others: Sequence[Evidence | None], sampled: Sa
     return text[0].upper() + text[1:]
 
 
-def _variance_clause(evidence: Evidence) -> str:
+def _variance_clause(evidence: EffectEvidence) -> str:
     few = evidence.attract and (evidence.calm[1] <= evidence.calm_long[1] or not evidence.attract_long)
     lags, test = (evidence.lags, evidence.calm) if few else (LONG_LAGS, evidence.calm_long)
     without = "drift, tones, correlation and disturbances" if evidence.episodes else "drift, tones and correlation"
@@ -152,7 +158,7 @@ def _variance_clause(evidence: Evidence) -> str:
     )
 
 
-def _garch_clause(evidence: Evidence, garch: Garch | None) -> list[str]:
+def _garch_clause(evidence: EffectEvidence, garch: GarchEffect | None) -> list[str]:
     """Whether GARCH(1,1) of the level explains the effect; a knock rules the fit, which then says nothing."""
     if garch is None or evidence.knocks or not math.isfinite(evidence.standardised[1]):
         return []
@@ -183,7 +189,7 @@ def _disturbance(episodes: Sequence[Episode]) -> str:
     return f"disturbance{'s' if len(episodes) > 1 else ''} at t = {times}"
 
 
-def _disturbance_clause(episodes: Sequence[Episode], others: Sequence[Evidence | None]) -> str:
+def _disturbance_clause(episodes: Sequence[Episode], others: Sequence[EffectEvidence | None]) -> str:
     """What moved: this gyro alone, or others of the array at the same time."""
     largest = max(episode.size for episode in episodes)
     text = f"{_disturbance(episodes)} of up to {largest:.0f} standard deviations, not ARCH"
@@ -198,7 +204,7 @@ def _disturbance_clause(episodes: Sequence[Episode], others: Sequence[Evidence |
     return f"{text}, in {max(together)} of {len(others)} gyros at the same time"
 
 
-def _rest_clause(evidence: Evidence) -> str:
+def _rest_clause(evidence: EffectEvidence) -> str:
     """What is left when everything is taken out."""
     few = evidence.calm[1] <= evidence.calm_long[1]
     lags, test = (evidence.lags, evidence.calm) if few else (LONG_LAGS, evidence.calm_long)

@@ -20,7 +20,7 @@ DISTURBED_LEVEL = 1e-3
 
 
 @dataclass(frozen=True)
-class Line:
+class SeriesLine:
     """A sinusoid in a series: frequency [Hz], amplitude, probability of so high a line anywhere in white noise."""
 
     frequency: float
@@ -40,7 +40,7 @@ class Whitened:
     quiet: np.ndarray
     drift: np.ndarray
     tones: np.ndarray
-    lines: tuple[Line, ...]
+    lines: tuple[SeriesLine, ...]
     autoregression: np.ndarray
     disturbed: np.ndarray
 
@@ -107,14 +107,14 @@ def usual_size(rest: np.ndarray) -> float:
     return size if size > 0 else float(np.sqrt(np.mean(np.square(rest))))
 
 
-def find_lines(series: np.ndarray, rate_hz: float, span: int) -> tuple[tuple[Line, ...], np.ndarray]:
+def find_lines(series: np.ndarray, rate_hz: float, span: int) -> tuple[tuple[SeriesLine, ...], np.ndarray]:
     """The sinusoids in a series [T] with drift: the lines, strongest first, and the sum of the sinusoids [T]."""
     half = min(span // 2, len(series) // 4)
     length = 2 * half + 1
     total = np.cumsum(np.concatenate([[0.0], series]))
     rest = series[half : len(series) - half] - (total[length:] - total[:-length]) / length
     time = np.arange(len(series)) - (len(series) - 1) / 2
-    found: list[Line] = []
+    found: list[SeriesLine] = []
     tones = np.zeros(len(series))
     for _ in range(MOST_LINES):
         place, chance = _highest_line(rest, 0.5 / length)
@@ -126,7 +126,7 @@ def find_lines(series: np.ndarray, rate_hz: float, span: int) -> tuple[tuple[Lin
         rest = rest - sinusoid[half : len(series) - half]
         sinusoid /= 1 - block_gain(frequency, length)
         tones += sinusoid
-        found.append(Line(frequency * rate_hz, math.sqrt(2 * float(np.mean(np.square(sinusoid)))), chance))
+        found.append(SeriesLine(frequency * rate_hz, math.sqrt(2 * float(np.mean(np.square(sinusoid)))), chance))
     return tuple(found), tones
 
 

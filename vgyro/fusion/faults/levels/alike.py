@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vgyro.fusion.faults.candidate import Candidate, running_sum, spread
+from vgyro.fusion.faults.candidate import SuspectedFault, running_sum, spread
 from vgyro.fusion.faults.levels.drift_variance import Slow
 
 SMOOTH = 8
@@ -19,7 +19,7 @@ they are switched on. Of six sizes by chance, the largest is ten times those of 
 What the noise gives is not taken off: evidence too weak to show that the others do less accuses no gyro."""
 
 
-def of_the_array(one: Candidate, parts: Sequence[Slow]) -> bool:
+def of_the_array(one: SuspectedFault, parts: Sequence[Slow]) -> bool:
     """Do the others follow what this gyro does, be it in the other direction and by less? Then it is no gyro's fault.
 
     parts : of every gyro, those of the others without this one in their combinations

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from vgyro.fusion.events import FaultKind
-from vgyro.fusion.faults.candidate import Candidate, lengths_up_to, running_sum
-from vgyro.fusion.faults.levels.change import Change, fit_change, hinge, lasting_change, run_of
+from vgyro.fusion.faults.candidate import SuspectedFault, lengths_up_to, running_sum
+from vgyro.fusion.faults.levels.change import LevelChange, fit_change, hinge, lasting_change, run_of
 from vgyro.fusion.faults.levels.drift_variance import Slow, contrasts
 
 LEAST_SIZE = 2.5
@@ -23,7 +23,7 @@ EARLY, MOST_OF_RUN = 0.05, 0.5
 """A new level that is reached so early in a run is the healthy one, and may be where nothing of the old one is left."""
 
 
-def suspect_bias(slow: Slow, gyro: int, block_s: float, threshold: float) -> list[Candidate]:
+def suspect_bias(slow: Slow, gyro: int, block_s: float, threshold: float) -> list[SuspectedFault]:
     """The clearest change of the level in units of what it does in health, made into a fault.
 
     returns : the likelier one first, where either side of the change may be the fault; none: there is no such change
@@ -35,7 +35,7 @@ def suspect_bias(slow: Slow, gyro: int, block_s: float, threshold: float) -> lis
     evidence, place, length = _contrast(slow, 0.5 * least)
     changes = [lasting_change(slow, *rows) for rows in _long_runs(slow)]
     lasting = max(changes, key=lambda one: one.evidence, default=None)
-    faults: list[Candidate] = []
+    faults: list[SuspectedFault] = []
     if evidence >= threshold:
         change = fit_change(slow, place, length)
         back = returns(slow, change)
@@ -79,7 +79,7 @@ def _windows(blocks: int) -> list[tuple[int, int]]:
     return even + [(length, MORE_BEFORE * length) for length in lengths_up_to(blocks // (2 + 2 * MORE_BEFORE))]
 
 
-def returns(slow: Slow, change: Change) -> tuple[int | None, int | None]:
+def returns(slow: Slow, change: LevelChange) -> tuple[int | None, int | None]:
     """Blocks for which the new level lasts, and the old one did, in the run; None: to its end, from its start."""
     low, high = run_of(slow, change.first)
     scatter = slow.usual_white / change.size**2
@@ -89,8 +89,13 @@ def returns(slow: Slow, change: Change) -> tuple[int | None, int | None]:
 
 
 def _passing(
-    slow: Slow, gyro: int, change: Change, returns: tuple[int | None, int | None], evidence: float, longest_step: int
-) -> Candidate:
+    slow: Slow,
+    gyro: int,
+    change: LevelChange,
+    returns: tuple[int | None, int | None],
+    evidence: float,
+    longest_step: int,
+) -> SuspectedFault:
     """The fault of a change that is taken back, on the side where it is so sooner."""
     low, _ = run_of(slow, change.first)
     forward, back = returns
@@ -103,7 +108,7 @@ def _passing(
     return _candidate(slow, gyro, change.first, change.last + forward, change.level, evidence, step)
 
 
-def _lasting(slow: Slow, gyro: int, change: Change, evidence: float, longest_step: int) -> list[Candidate]:
+def _lasting(slow: Slow, gyro: int, change: LevelChange, evidence: float, longest_step: int) -> list[SuspectedFault]:
     """The faults that a change may be that is not taken back: it begins one, rather than that it ends one.
 
     It ends one where the new level is there almost from the start on, and may do so where the old one is never seen.
@@ -120,17 +125,17 @@ def _lasting(slow: Slow, gyro: int, change: Change, evidence: float, longest_ste
 
 def _candidate(
     slow: Slow, gyro: int, first: int, last: int, level: float, evidence: float, step: bool
-) -> Candidate:  # fmt: skip
+) -> SuspectedFault:  # fmt: skip
     last = max(last, first + 1)
     kind: FaultKind = "step" if step else "drift"
-    return Candidate(gyro, kind, first, last, evidence, _size(slow.mean[first:last] - level), "deg/s")
+    return SuspectedFault(gyro, kind, first, last, evidence, _size(slow.mean[first:last] - level), "deg/s")
 
 
-def _onset(slow: Slow, about: int, last: int, low: int) -> Change:
+def _onset(slow: Slow, about: int, last: int, low: int) -> LevelChange:
     """How a fault that ends at block `last` began, near block `about`."""
     reach = max(8, last - about)
     first = max(low, about - reach)
-    return hinge(slow, first, last) if last - first > 4 else Change(about, about, 0.0, 0.0)
+    return hinge(slow, first, last) if last - first > 4 else LevelChange(about, about, 0.0, 0.0)
 
 
 def _return(share: np.ndarray, scatter: float) -> int | None:

@@ -20,7 +20,7 @@ LEAST_POWER, UNKNOWN_TIMES = 1e-9, 1e9
 
 
 @dataclass(frozen=True)
-class Change:
+class LevelChange:
     """The level is `level` until block `first`, goes straight to level + size, and is there from block `last` on.
 
     evidence : size over its standard deviation, where the fit knows of the wander
@@ -33,7 +33,7 @@ class Change:
     evidence: float = 0.0
 
 
-def fit_change(slow: Slow, place: int, length: int) -> Change:
+def fit_change(slow: Slow, place: int, length: int) -> LevelChange:
     """Least-squares change of level near a block; the stretch that is fitted grows until the change lies inside it."""
     low, high = run_of(slow, place)
     reach = max(4, int(SIDE * length))
@@ -50,7 +50,7 @@ def fit_change(slow: Slow, place: int, length: int) -> Change:
     return change
 
 
-def hinge(slow: Slow, first: int, last: int) -> Change:
+def hinge(slow: Slow, first: int, last: int) -> LevelChange:
     """The best of all changes that begin and end between two blocks: on a grid, then once more near its best."""
     step = max(1, (last - first) // BINS)
     begins = np.arange(first, last, step)
@@ -72,7 +72,7 @@ def hinge(slow: Slow, first: int, last: int) -> Change:
     return change
 
 
-def _sharpened(slow: Slow, change: Change, step: int, first: int, last: int) -> Change:
+def _sharpened(slow: Slow, change: LevelChange, step: int, first: int, last: int) -> LevelChange:
     low, high = max(first, change.first - 16 * step), min(last, change.last + 16 * step)
     if high - low > 8 * BINS:
         return change
@@ -85,7 +85,7 @@ def _sharpened(slow: Slow, change: Change, step: int, first: int, last: int) -> 
 
 def _best_knots(
     middle: np.ndarray, mean: np.ndarray, weight: np.ndarray, begins: np.ndarray, ends: np.ndarray
-) -> Change:
+) -> LevelChange:
     """The pair of knots with the least squares, level and size free."""
     begin, end = (grid.ravel() for grid in np.meshgrid(begins, ends, indexing="ij"))
     begin, end = begin[end >= begin], end[end >= begin]
@@ -99,7 +99,7 @@ def _best_knots(
     place = int(np.argmax(gain))
     size = float(along[place] / power[place])
     level = float(own - size * (ramp[place] @ weight) / total)
-    return Change(int(begin[place]), int(end[place]), level, size)
+    return LevelChange(int(begin[place]), int(end[place]), level, size)
 
 
 def run_of(slow: Slow, place: int) -> tuple[int, int]:
@@ -108,7 +108,7 @@ def run_of(slow: Slow, place: int) -> tuple[int, int]:
     return int(run[0]), int(run[-1]) + 1
 
 
-def lasting_change(slow: Slow, low: int, high: int) -> Change:
+def lasting_change(slow: Slow, low: int, high: int) -> LevelChange:
     """The clearest change of level in blocks [low, high), by generalised least squares: flicker and walk are known.
 
     After the whole stretch ever nearer ones about the change are fitted, until single blocks are the points.
@@ -127,7 +127,7 @@ def lasting_change(slow: Slow, low: int, high: int) -> Change:
     return replace(change, evidence=evidence)
 
 
-def _general_hinge(slow: Slow, first: int, last: int) -> Change:
+def _general_hinge(slow: Slow, first: int, last: int) -> LevelChange:
     points = min(POINTS, last - first)
     edges = first + np.arange(points + 1) * (last - first) // points
     number = np.add.reduceat(slow.counts[first:last].astype(float), edges[:-1] - first)
@@ -148,7 +148,7 @@ def _general_hinge(slow: Slow, first: int, last: int) -> Change:
     ramp = _ramp(points, begin, end)
     best, size, evidence = _best_ramp(inverse, mean, ramp)
     level = float(column @ (mean - size * ramp[best]) / column.sum())
-    return Change(int(edges[begin[best]]), int(edges[end[best]]), level, size, evidence)
+    return LevelChange(int(edges[begin[best]]), int(edges[end[best]]), level, size, evidence)
 
 
 def _best_ramp(inverse: np.ndarray, mean: np.ndarray, ramp: np.ndarray) -> tuple[int, float, float]:

@@ -38,7 +38,7 @@ UNKNOWN = 20
 
 
 @dataclass(frozen=True)
-class Grid:
+class DriftGrid:
     """Every pair of flicker and walk [G] for runs of n points with one profile of white noise.
 
     inverse : [G, n, n] of the covariance, any level taken out;  log_norm : [G]
@@ -101,7 +101,7 @@ def changes_of_level(points: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=16)
-def _grid(points: int, profile: tuple[int, ...]) -> Grid:
+def _grid(points: int, profile: tuple[int, ...]) -> DriftGrid:
     """profile : [n] powers of four, the variance of the white part of each point over its usual one."""
     white = np.diag(4.0 ** np.array(profile, dtype=float))
     flicker, walk = covariances(points)
@@ -118,7 +118,7 @@ def _grid(points: int, profile: tuple[int, ...]) -> Grid:
     # Single precision: most of the work is here, and a prior is added to it.
     short = changes.astype(np.float32)
     power = np.maximum(((inverse.astype(np.float32) @ short) * short).sum(axis=1, dtype=float), 1e-12)
-    return Grid(inverse, log_norm, changes, log_prior, power)
+    return DriftGrid(inverse, log_norm, changes, log_prior, power)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import pyarrow as pa
 
 from vgyro.errors import DataError
 from vgyro.storage.logs.binary.opened import WIDEST, Damaged, Unique, batch_of, rows_at_a_time
-from vgyro.storage.logs.table import Kind, LogColumn, LogTable, Rows
+from vgyro.storage.logs.table import Kind, LogColumn, LogRows, LogTable
 
 Take = Callable[[np.ndarray], np.ndarray]
 DAYS = (np.datetime64("1677-09-22"), np.datetime64("2262-04-10"))
@@ -38,7 +38,7 @@ class Variable:
     turned: Callable[[int], Iterator[np.ndarray]] | None = None
 
 
-class Leaf(NamedTuple):
+class ArrayLeaf(NamedTuple):
     """A column, the variable it is of, and how it is taken from one of its blocks."""
 
     column: LogColumn
@@ -51,7 +51,7 @@ def blocks_of(array: np.ndarray) -> Callable[[int], Iterator[np.ndarray]]:
     return lambda size: (array[start : start + size] for start in range(0, len(array), size))
 
 
-def tables_of(variables: Sequence[Variable], path: Path) -> dict[str, tuple[LogTable, list[Leaf]]]:
+def tables_of(variables: Sequence[Variable], path: Path) -> dict[str, tuple[LogTable, list[ArrayLeaf]]]:
     """Tables by name, each with its columns.
 
     Vectors of one length, and matrices with as many rows (or, turned, columns), are the table "". What is left over
@@ -81,11 +81,11 @@ def _together(variables: Sequence[Variable]) -> list[Variable]:
     return found
 
 
-def _table(name: str, variables: Sequence[Variable], path: Path) -> tuple[LogTable, list[Leaf]]:
-    unique, leaves = Unique(), list[Leaf]()
+def _table(name: str, variables: Sequence[Variable], path: Path) -> tuple[LogTable, list[ArrayLeaf]]:
+    unique, leaves = Unique(), list[ArrayLeaf]()
     for variable in variables:
         for column, kind, unit, take in islice(_spread(variable.name, variable.dtype, variable.shape[1:]), WIDEST + 1):
-            leaves.append(Leaf(LogColumn(unique(column), kind, unit), variable, take))
+            leaves.append(ArrayLeaf(LogColumn(unique(column), kind, unit), variable, take))
         if len(leaves) > WIDEST:
             remedy = "save it so that time runs along the first axis"
             raise DataError(f"{variable.name} has more than {WIDEST} columns", str(path), remedy)
@@ -121,7 +121,7 @@ def _column(index: int, block: np.ndarray) -> np.ndarray:
     return block[:, index]
 
 
-def stream(leaves: Sequence[Leaf]) -> Iterator[Rows]:
+def stream(leaves: Sequence[ArrayLeaf]) -> Iterator[LogRows]:
     """Rows of the wanted columns, block by block; only their variables are read."""
     if not leaves:
         return
@@ -133,7 +133,7 @@ def stream(leaves: Sequence[Leaf]) -> Iterator[Rows]:
         whole = min(map(len, blocks))  # of one that is cut short, and then ends in an error
         held = {name: block[:whole] for name, block in zip(variables, blocks, strict=True)}
         batch = batch_of(names, [arrow(leaf.take(held[leaf.variable.name])) for leaf in leaves])
-        yield Rows(batch, place)
+        yield LogRows(batch, place)
         place += batch.num_rows
 
 

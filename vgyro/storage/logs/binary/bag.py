@@ -14,7 +14,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from vgyro.storage.logs.binary.bag_fields import ARRAY, Leaf, has_sequences, leaves_of
+from vgyro.storage.logs.binary.bag_fields import ARRAY, MessageLeaf, has_sequences, leaves_of
 from vgyro.storage.logs.binary.bag_files import MCAP, ROS1, check_profile, kind_of, readable, whole_mcap
 from vgyro.storage.logs.binary.opened import (  # fmt: skip
     DAMAGE,
@@ -29,7 +29,7 @@ from vgyro.storage.logs.binary.opened import (  # fmt: skip
     reason,
     until_damage,
 )
-from vgyro.storage.logs.table import Account, BadLine, LogColumn, LogTable, Rows
+from vgyro.storage.logs.table import Account, BadLine, LogColumn, LogRows, LogTable
 
 MESSAGES = 1 << 15
 MOST_BAD = 1000
@@ -44,7 +44,7 @@ class Topic:
     msgtype: str
     connections: frozenset[int]
     store: Any
-    leaves: dict[str, Leaf]
+    leaves: dict[str, MessageLeaf]
 
 
 def open_log(path: Path) -> OpenedLog:
@@ -78,7 +78,7 @@ def open_log(path: Path) -> OpenedLog:
                 topics[table.name] = topic
                 tables.append(table)
 
-    def stream(opened: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def stream(opened: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[LogRows]:
         return _stream(path, kind, topics[table.name], columns, opened)
 
     if kind == MCAP and whole_mcap(path) is not None:
@@ -185,16 +185,16 @@ def _message(store: Any, data: bytes, msgtype: str, ros1: bool) -> Any:
     return store.deserialize_ros1(data, msgtype) if ros1 else store.deserialize_cdr(data, msgtype)
 
 
-def _stream(path: Path, kind: bytes, topic: Topic, columns: Sequence[str], opened: OpenedLog) -> Iterator[Rows]:
+def _stream(path: Path, kind: bytes, topic: Topic, columns: Sequence[str], opened: OpenedLog) -> Iterator[LogRows]:
     leaves = [topic.leaves.get(name) for name in columns]
     types = [pa.int64() if leaf is None else leaf.type for leaf in leaves]
     held: list[list[Any]] = [[] for _ in columns]
     bad: list[BadLine] = []
     place, known = 1, 0
 
-    def block() -> Rows:
+    def block() -> LogRows:
         arrays = [pa.array(values, type_) for values, type_ in zip(held, types, strict=True)]
-        return Rows(batch_of(columns, arrays), place, tuple(bad))
+        return LogRows(batch_of(columns, arrays), place, tuple(bad))
 
     with _reader(path, kind) as reader:
         group = [one for one in reader.connections if one.id in topic.connections]

@@ -40,7 +40,7 @@ UNITS = {
 """Units that the messages' definitions state, of a field and all below it."""
 
 
-class Leaf(NamedTuple):
+class MessageLeaf(NamedTuple):
     """A column, how it is taken from a message (None where an array is too short), its Arrow type."""
 
     column: LogColumn
@@ -48,7 +48,7 @@ class Leaf(NamedTuple):
     type: pa.DataType
 
 
-def leaves_of(msgtype: str, fields: Fields, example: Any) -> list[Leaf]:
+def leaves_of(msgtype: str, fields: Fields, example: Any) -> list[MessageLeaf]:
     """The columns of a message type, before them the receiver's "time".
 
     example : a message, which tells how long its arrays of any length are; None: they make no columns
@@ -56,7 +56,7 @@ def leaves_of(msgtype: str, fields: Fields, example: Any) -> list[Leaf]:
     """
     unique = Unique({"time"})
     found = [
-        Leaf(LogColumn(unique(name), kind, unit), take, type_)
+        MessageLeaf(LogColumn(unique(name), kind, unit), take, type_)
         for name, kind, unit, take, type_ in islice(_walk(msgtype, fields, "", example, "", 0), MOST)
     ]
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from vgyro.errors import DataError
 from vgyro.storage.logs.binary.arrays import Variable, blocks_of, stream, tables_of
 from vgyro.storage.logs.binary.opened import OpenedLog, check_not_empty, reading
-from vgyro.storage.logs.table import Account, LogTable, Rows
+from vgyro.storage.logs.table import Account, LogRows, LogTable
 
 if TYPE_CHECKING:
     from vgyro.storage.logs.binary.mat5 import Array
@@ -54,7 +54,7 @@ def open_log(path: Path) -> OpenedLog:
         objects = any("object" in note for note in notes)
         raise DataError(what, str(path), AS_STRUCT if objects else "save vectors and matrices of numbers")
 
-    def rows(_: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def rows(_: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[LogRows]:
         leaves = {leaf.column.name: leaf for leaf in made[table.name][1]}
         return stream([leaves[name] for name in columns])
 

@@ -15,9 +15,9 @@ from typing import IO, NamedTuple
 import numpy as np
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.binary.arrays import Leaf, Variable, blocks_of, stream, tables_of
+from vgyro.storage.logs.binary.arrays import ArrayLeaf, Variable, blocks_of, stream, tables_of
 from vgyro.storage.logs.binary.opened import WIDEST, OpenedLog, check_not_empty, reading, too_many
-from vgyro.storage.logs.table import Account, LogTable, Rows
+from vgyro.storage.logs.table import Account, LogRows, LogTable
 
 ZIP = b"PK\x03\x04"
 ERRORS = (zipfile.BadZipFile, zipfile.LargeZipFile, tokenize.TokenError)
@@ -64,8 +64,8 @@ def _open_npy(path: Path) -> OpenedLog:
     return _opened(path, made, [])
 
 
-def _opened(path: Path, made: dict[str, tuple[LogTable, list[Leaf]]], notes: list[str]) -> OpenedLog:
-    def rows(_: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+def _opened(path: Path, made: dict[str, tuple[LogTable, list[ArrayLeaf]]], notes: list[str]) -> OpenedLog:
+    def rows(_: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[LogRows]:
         leaves = {leaf.column.name: leaf for leaf in made[table.name][1]}
         return stream([leaves[name] for name in columns])
 

@@ -17,7 +17,7 @@ from typing import TypeVar
 import pyarrow as pa
 
 from vgyro.errors import DataError
-from vgyro.storage.logs.table import Account, LogTable, Rows
+from vgyro.storage.logs.table import Account, LogRows, LogTable
 from vgyro.validation import did_you_mean
 
 ROWS = 1 << 18
@@ -116,7 +116,7 @@ class Unique:
         return free
 
 
-Stream = Callable[["OpenedLog", LogTable, Sequence[str]], Iterable[Rows]]
+Stream = Callable[["OpenedLog", LogTable, Sequence[str]], Iterable[LogRows]]
 
 
 @dataclass
@@ -145,11 +145,11 @@ class OpenedLog:
         if not self.account.content_bytes and self.path.is_file():
             self.account.content_bytes = self.path.stat().st_size
 
-    def rows(self, table: str, columns: Sequence[str]) -> Iterator[Rows]:
+    def rows(self, table: str, columns: Sequence[str]) -> Iterator[LogRows]:
         """Stream some columns of a table.  raises : DataError, as LogFile says"""
         return self._read(self._table(table, columns), columns)
 
-    def _read(self, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def _read(self, table: LogTable, columns: Sequence[str]) -> Iterator[LogRows]:
         self.broken.clear()
         given = 0
         for rows in until_damage(iter(self.stream(self, table, columns)), self.errors, self.broken):

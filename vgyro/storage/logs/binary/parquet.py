@@ -23,12 +23,12 @@ from vgyro.storage.logs.binary.opened import (
     reading,
     rows_at_a_time,
 )  # fmt: skip
-from vgyro.storage.logs.table import Kind, LogColumn, LogTable, Rows
+from vgyro.storage.logs.table import Kind, LogColumn, LogRows, LogTable
 
 Take = Callable[[pa.Array], pa.Array]
 
 
-class Leaf(NamedTuple):
+class ParquetLeaf(NamedTuple):
     """A column of the table, and how it is taken from the file's column number `root`."""
 
     column: LogColumn
@@ -54,7 +54,7 @@ def open_log(path: Path) -> OpenedLog:
     table = LogTable("", tuple(leaf.column for leaf in leaves), count)
     tables = (table,) if any(column.kind == "number" for column in table.columns) else ()
 
-    def stream(_: OpenedLog, __: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def stream(_: OpenedLog, __: LogTable, columns: Sequence[str]) -> Iterator[LogRows]:
         return _stream(path, schema, [found[name] for name in columns])
 
     return OpenedLog(path, "parquet", tables, stream)
@@ -72,15 +72,15 @@ def _is_list(kind: pa.DataType) -> bool:
     return pa.types.is_list(kind) or pa.types.is_large_list(kind)
 
 
-def _leaves(schema: pa.Schema, first: pa.RecordBatch | None, path: Path) -> list[Leaf]:
-    unique, leaves = Unique(), list[Leaf]()
+def _leaves(schema: pa.Schema, first: pa.RecordBatch | None, path: Path) -> list[ParquetLeaf]:
+    unique, leaves = Unique(), list[ParquetLeaf]()
     for root, field in enumerate(schema):
         width = 0
         if first is not None and _is_list(field.type) and (index := first.schema.get_field_index(field.name)) >= 0:
             width = max((len(row) for row in first.column(index) if row.is_valid), default=0)
         for name, kind, unit, take in islice(_spread(field.name, field.type, width), WIDEST + 1):
             said = (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
-            leaves.append(Leaf(LogColumn(unique(name), kind, unit or said), root, take))
+            leaves.append(ParquetLeaf(LogColumn(unique(name), kind, unit or said), root, take))
         if len(leaves) > WIDEST:
             raise DataError(f"has more than {WIDEST} columns", str(path), "save time along the rows")
     return leaves
@@ -149,7 +149,7 @@ def _plain(kind: pa.DataType) -> tuple[Kind, str, Take] | None:
     return None
 
 
-def _stream(path: Path, schema: pa.Schema, leaves: Sequence[Leaf]) -> Iterator[Rows]:
+def _stream(path: Path, schema: pa.Schema, leaves: Sequence[ParquetLeaf]) -> Iterator[LogRows]:
     import pyarrow.parquet as pq
 
     names = list(dict.fromkeys(schema.field(leaf.root).name for leaf in leaves))
@@ -157,7 +157,7 @@ def _stream(path: Path, schema: pa.Schema, leaves: Sequence[Leaf]) -> Iterator[R
     with pq.ParquetFile(path, page_checksum_verification=True) as file:
         for batch in file.iter_batches(rows_at_a_time(len(leaves)), columns=names, use_threads=False):
             arrays = [leaf.take(_column(batch, schema, leaf.root)) for leaf in leaves]
-            yield Rows(batch_of([leaf.column.name for leaf in leaves], arrays), place)
+            yield LogRows(batch_of([leaf.column.name for leaf in leaves], arrays), place)
             place += batch.num_rows
 
 

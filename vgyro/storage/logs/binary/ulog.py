@@ -25,7 +25,7 @@ from vgyro.storage.logs.binary.opened import (
     rows_at_a_time,
 )  # fmt: skip
 from vgyro.storage.logs.binary.ulog_scan import Contents, copy_needed, fields_of, scan
-from vgyro.storage.logs.table import Account, LogColumn, LogTable, Rows
+from vgyro.storage.logs.table import Account, LogColumn, LogRows, LogTable
 
 FIFO = {"sensor_gyro_fifo": "rad/s", "sensor_accel_fifo": "m/s²"}
 FIFO_FIELDS = ("timestamp_sample", "dt", "scale", "samples", "x[0]", "y[0]", "z[0]")
@@ -70,7 +70,7 @@ def open_log(path: Path) -> OpenedLog:
             columns = _fifo_columns(name, fields) if fifo else _columns(name, fields)
             tables[title] = LogTable(title, columns, None if fifo else count)
 
-    def stream(opened: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[Rows]:
+    def stream(opened: OpenedLog, table: LogTable, columns: Sequence[str]) -> Iterator[LogRows]:
         return _stream(path, found, table, columns, opened)
 
     return OpenedLog(path, "ulog", tuple(tables.values()), stream, Account(notes=_notes(found)))
@@ -103,7 +103,9 @@ def _fifo_columns(topic: str, fields: Sequence[str]) -> tuple[LogColumn, ...]:
     return (LogColumn("timestamp", "number", "us"), *axes, *device)
 
 
-def _stream(path: Path, found: Contents, table: LogTable, columns: Sequence[str], opened: OpenedLog) -> Iterator[Rows]:
+def _stream(
+    path: Path, found: Contents, table: LogTable, columns: Sequence[str], opened: OpenedLog
+) -> Iterator[LogRows]:
     topic, _, instance = table.name.partition("#")
     data = _loaded(path, found, topic, int(instance or 0), found.sound)
     expected = sum(
@@ -120,7 +122,7 @@ def _stream(path: Path, found: Contents, table: LogTable, columns: Sequence[str]
         count, size = len(held["timestamp"]), rows_at_a_time(len(columns))
         for start in range(0, count, size):
             stop = min(start + size, count)
-            yield Rows(batch_of(columns, [arrow(held[name][start:stop]) for name in columns]), place + start)
+            yield LogRows(batch_of(columns, [arrow(held[name][start:stop]) for name in columns]), place + start)
         place += count
 
 

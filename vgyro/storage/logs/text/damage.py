@@ -14,7 +14,7 @@ NAMED = 1000
 SHOWN = 80
 
 
-class Damage:
+class TextDamage:
     """Sorts lines that do not fit, and counts them in the account.
 
     known : lines that may come again and are none;  cut : numbers of lines before the first row that are damage

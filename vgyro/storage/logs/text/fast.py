@@ -9,10 +9,10 @@ import pyarrow as pa
 
 from vgyro import engine as engines
 from vgyro.engine.text import CELL, CHECKSUM, FEW, KIND, LABEL, LEAD, MANY, NULL, PAD, QUOTE, Field, Parsed
-from vgyro.storage.logs.table import Rows
+from vgyro.storage.logs.table import LogRows
 from vgyro.storage.logs.text.blocks import Block, Lines
 from vgyro.storage.logs.text.columns import Part, TableForm
-from vgyro.storage.logs.text.damage import Damage
+from vgyro.storage.logs.text.damage import TextDamage
 
 ROWS = 1 << 17
 """Most rows of a batch."""
@@ -22,7 +22,7 @@ CALLED = {
 }  # fmt: skip
 
 
-class Reader:
+class TextReader:
     """Reads some columns of one table of a file."""
 
     def __init__(self, form: TableForm, columns: Sequence[str], engine: str, codec: str, swap: bytes) -> None:
@@ -39,7 +39,7 @@ class Reader:
         line = type(form.line)(**{**vars(form.line), "fields": self._fields})
         self._parser = engines.get(engine).text.Parser(line)
 
-    def rows(self, lines: Lines, damage: Damage, start: int) -> Iterator[Rows]:
+    def rows(self, lines: Lines, damage: TextDamage, start: int) -> Iterator[LogRows]:
         """All rows, with the damage among them; lines before number `start` are none."""
         for block in lines.blocks(count=False):
             damage.too_long(block.long)
@@ -59,7 +59,7 @@ class Reader:
                 batch = self._batch(found, data, at - found.consumed)
                 bad = damage.taken()
                 if batch.num_rows or bad:
-                    yield Rows(batch, first, bad)
+                    yield LogRows(batch, first, bad)
             lines.line = line
 
     def _swapped(self, block: Block) -> tuple[np.ndarray, int]:
@@ -68,13 +68,13 @@ class Reader:
         content = block.data[: block.size].tobytes().replace(self._swap, b"\x1f")
         return np.frombuffer(content + b"\0" * PAD, dtype=np.uint8), len(content)
 
-    def _note(self, found: Parsed, data: np.ndarray, at: int, line: int, damage: Damage) -> None:
+    def _note(self, found: Parsed, data: np.ndarray, at: int, line: int, damage: TextDamage) -> None:
         damage.account.other += found.other
         for offset, size, number, field, why in found.bad.tolist():
             text = data[at + offset : at + offset + size].tobytes()
             damage.line(line + number, text, self._expected(why, field))
 
-    def _note_last(self, data: np.ndarray, number: int, found: Parsed, damage: Damage) -> None:
+    def _note_last(self, data: np.ndarray, number: int, found: Parsed, damage: TextDamage) -> None:
         """The file's last line, which has no end: a row, or cut within."""
         if len(found.bad) and found.bad[-1, 2] == found.lines - 1:
             damage.cut(number)

@@ -16,8 +16,8 @@ from vgyro.storage.logs.text.columns import Naming, TableForm, Typed
 from vgyro.storage.logs.text.damage import shown
 from vgyro.storage.logs.text.delimiter import Signs, find_signs
 from vgyro.storage.logs.text.head import (
-    Head,
     Lead,
+    TextHead,
     find_lead,
     has_checksums,
     sample,
@@ -52,10 +52,10 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Finder:
+class FormFinder:
     """Looks for the form of one head."""
 
-    head: Head
+    head: TextHead
     given: TextForm
     path: Path
 

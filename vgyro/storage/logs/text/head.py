@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Head:
+class TextHead:
     """Lines of the head, without their ends; the first is number 1.
 
     whole : are they all lines of the file?;  ended : does the last line have an end?
@@ -50,7 +50,7 @@ class Head:
         return [(number, line.strip()) for number, line in numbered if line.strip() and not is_comment(line)]
 
 
-def read_head(source: SourceFile, form: TextForm, swap: bytes = b"") -> Head:
+def read_head(source: SourceFile, form: TextForm, swap: bytes = b"") -> TextHead:
     """The head of a log; `swap`: bytes that are taken for one sign, chr(31).
 
     raises : DataError for a file that is empty or binary, and for one whose first line does not end
@@ -81,7 +81,7 @@ def read_head(source: SourceFile, form: TextForm, swap: bytes = b"") -> Head:
         # What the head's end cuts, or the nothing behind the last end.
         lines.pop()
     codec = "latin-1" if encoding.name == "latin-1" else "utf-8"
-    return Head(tuple(one.decode(codec, "replace") for one in lines), encoding, eol, whole, ended)
+    return TextHead(tuple(one.decode(codec, "replace") for one in lines), encoding, eol, whole, ended)
 
 
 def _first(source: SourceFile) -> bytes:

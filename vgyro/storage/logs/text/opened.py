@@ -7,12 +7,12 @@ from pathlib import Path
 
 from vgyro.errors import DataError
 from vgyro.log import TextForm
-from vgyro.storage.logs.table import Account, LogTable, Rows
+from vgyro.storage.logs.table import Account, LogRows, LogTable
 from vgyro.storage.logs.text.blocks import Lines
-from vgyro.storage.logs.text.damage import Damage
-from vgyro.storage.logs.text.fast import Reader
-from vgyro.storage.logs.text.form import Finder, Form
-from vgyro.storage.logs.text.head import Head, read_head, sample
+from vgyro.storage.logs.text.damage import TextDamage
+from vgyro.storage.logs.text.fast import TextReader
+from vgyro.storage.logs.text.form import Form, FormFinder
+from vgyro.storage.logs.text.head import TextHead, read_head, sample
 from vgyro.storage.logs.text.slow import NamedForm, NamedReader, json_form
 from vgyro.storage.sources import open_sources
 from vgyro.validation import did_you_mean
@@ -26,7 +26,7 @@ class TextLog:
 
     family = "text"
 
-    def __init__(self, path: Path, head: Head, form: Form | NamedForm, engine: str, swap: bytes, skip: int) -> None:
+    def __init__(self, path: Path, head: TextHead, form: Form | NamedForm, engine: str, swap: bytes, skip: int) -> None:
         self.path, self._head, self._form, self._engine, self._swap, self._skip = path, head, form, engine, swap, skip
         self.account = Account(compression=open_sources([path]).files[0].compression)
 
@@ -37,7 +37,7 @@ class TextLog:
             return (self._form.table,)
         return tuple(form.table for form in self._form.tables)
 
-    def rows(self, table: str, columns: Sequence[str]) -> Iterator[Rows]:
+    def rows(self, table: str, columns: Sequence[str]) -> Iterator[LogRows]:
         """Stream some columns of one table, a block of lines at a time.
 
         raises : DataError for a table or column that is not there, and where no line is a row
@@ -53,7 +53,7 @@ class TextLog:
             raise DataError("columns must be named, each once", str(self.path))
         return self._stream(names.index(table), columns)
 
-    def _stream(self, table: int, columns: Sequence[str]) -> Iterator[Rows]:
+    def _stream(self, table: int, columns: Sequence[str]) -> Iterator[LogRows]:
         source = open_sources([self.path]).files[0]
         lines = Lines(source, self._head.encoding, self._head.eol)
         # The account itself stays: others may hold it.
@@ -61,12 +61,12 @@ class TextLog:
         account.rows = account.bad = account.other = 0
         account.notes.clear()
         form = self._form if isinstance(self._form, Form) else Form((), self._skip + 1)
-        damage = Damage(account, self._head.codec, form.known, form.cut)
+        damage = TextDamage(account, self._head.codec, form.known, form.cut)
         if isinstance(self._form, NamedForm):
             named = NamedReader(self._form, columns, self._head.codec)
             stream = named.rows(lines, damage, self._head.eol, form.start)
         else:
-            reader = Reader(form.tables[table], columns, self._engine, self._head.codec, self._swap)
+            reader = TextReader(form.tables[table], columns, self._engine, self._head.codec, self._swap)
             stream = reader.rows(lines, damage, form.start)
         for rows in stream:
             account.rows += rows.batch.num_rows
@@ -98,6 +98,6 @@ def open_log(path: Path, form: TextForm, engine: str = "native") -> TextLog:
     body = sample([line for _, line in head.body(form.skip)])
     found: Form | NamedForm | None = json_form(body) if form.delimiter is None else None
     if found is None:
-        finder = Finder(head, form, path)
+        finder = FormFinder(head, form, path)
         found = finder.labels() or finder.find()
     return TextLog(path, head, found, engine, swap, form.skip)

@@ -12,11 +12,11 @@ import pyarrow as pa
 
 from vgyro.engine.reference.text import date, hexadecimal, integer, number, time_of_day
 from vgyro.engine.text import Cell
-from vgyro.storage.logs.table import LogColumn, LogTable, Rows
+from vgyro.storage.logs.table import LogColumn, LogRows, LogTable
 from vgyro.storage.logs.text.blocks import Lines
 from vgyro.storage.logs.text.cells import LABEL, Stamp, is_value, kind_of, missing, name_of, split
 from vgyro.storage.logs.text.columns import KINDS
-from vgyro.storage.logs.text.damage import Damage
+from vgyro.storage.logs.text.damage import TextDamage
 from vgyro.storage.logs.text.delimiter import Signs
 from vgyro.storage.logs.text.header import unit_of
 
@@ -29,7 +29,7 @@ MOST_ITEMS = 64
 Value = str | float | int | bool | None
 
 
-class Misfit(Exception):
+class LineMisfit(Exception):
     """A line that does not fit: what was expected."""
 
 
@@ -53,7 +53,7 @@ def json_form(lines: Sequence[str]) -> NamedForm | None:
         if line.startswith("{"):
             try:
                 found.append(_json_values(line))
-            except Misfit:
+            except LineMisfit:
                 continue
     return _form(found, None, ["JSON lines"]) if found and len(found) >= LIKELY * len(lines) else None
 
@@ -64,7 +64,7 @@ def label_form(lines: Sequence[str], signs: Signs) -> NamedForm | None:
     for line in lines:
         try:
             found.append(_label_values(line, signs))
-        except Misfit:
+        except LineMisfit:
             continue
     if len(found) < LIKELY * len(lines) or len(found) < 2:
         return None
@@ -94,9 +94,9 @@ def _json_values(line: str) -> dict[str, Value]:
         # Integers stay exact; a number in quotes is one, too.
         made = json.loads(line)
     except (ValueError, RecursionError):
-        raise Misfit("expected a JSON object") from None
+        raise LineMisfit("expected a JSON object") from None
     if not isinstance(made, dict):
-        raise Misfit("expected a JSON object")
+        raise LineMisfit("expected a JSON object")
     values: dict[str, Value] = {}
     _flatten("", made, values, 0)
     return values
@@ -104,13 +104,13 @@ def _json_values(line: str) -> dict[str, Value]:
 
 def _flatten(name: str, value: object, into: dict[str, Value], depth: int) -> None:
     if depth > DEEPEST:
-        raise Misfit("expected a JSON object that is not so deep")
+        raise LineMisfit("expected a JSON object that is not so deep")
     if isinstance(value, dict):
         for key, inner in value.items():
             _flatten(f"{name}.{key}" if name else str(key), inner, into, depth + 1)
     elif isinstance(value, list):
         if len(value) > MOST_ITEMS:
-            raise Misfit(f"expected arrays of at most {MOST_ITEMS} values")
+            raise LineMisfit(f"expected arrays of at most {MOST_ITEMS} values")
         for place, inner in enumerate(value):
             _flatten(f"{name}[{place}]", inner, into, depth + 1)
     else:
@@ -129,13 +129,13 @@ def _label_values(line: str, signs: Signs) -> dict[str, Value]:
     for cell in cells:
         found = LABEL.fullmatch(cell)
         if found is None or not (found[2] is None or is_value(found[2].strip(), signs.decimal) or missing(found[2])):
-            raise Misfit(f"expected values with labels, such as {'gx:0.1'!r}")
+            raise LineMisfit(f"expected values with labels, such as {'gx:0.1'!r}")
         name = name_of(found[1])
         if name in values:
-            raise Misfit(f"has {name} twice")
+            raise LineMisfit(f"has {name} twice")
         values[name] = (found[2] or "").strip()
     if not values:
-        raise Misfit("expected values with labels")
+        raise LineMisfit("expected values with labels")
     return values
 
 
@@ -146,7 +146,7 @@ class NamedReader:
         self._form, self._columns, self._codec = form, list(columns), codec
         self._decimal = form.signs.decimal if form.signs else "."
 
-    def rows(self, lines: Lines, damage: Damage, eol: bytes, start: int) -> Iterator[Rows]:
+    def rows(self, lines: Lines, damage: TextDamage, eol: bytes, start: int) -> Iterator[LogRows]:
         """All rows, with the damage among them."""
         held: list[list] = []
         place = 0
@@ -169,7 +169,7 @@ class NamedReader:
         if rest.batch.num_rows or rest.bad:
             yield rest
 
-    def _row(self, line: int, raw: bytes, damage: Damage, last: bool) -> list | None:
+    def _row(self, line: int, raw: bytes, damage: TextDamage, last: bool) -> list | None:
         text = raw.decode(self._codec, "replace").strip()
         if not text:
             return None
@@ -179,7 +179,7 @@ class NamedReader:
                 damage.account.other += 1
                 return None
             row = [self._value(name, values.get(name)) for name in self._columns]
-        except Misfit as misfit:
+        except LineMisfit as misfit:
             damage.line(line, raw, str(misfit))
             if last:
                 damage.cut(line)
@@ -205,13 +205,13 @@ class NamedReader:
         else:
             found = time_of_day(text, "")
         if found is None:
-            raise Misfit(f"expected {'a number' if kind in ('number', 'hex', 'integer') else 'a time'} as {name}")
+            raise LineMisfit(f"expected {'a number' if kind in ('number', 'hex', 'integer') else 'a time'} as {name}")
         return found
 
-    def _given(self, held: list[list], place: int, damage: Damage) -> Rows:
+    def _given(self, held: list[list], place: int, damage: TextDamage) -> LogRows:
         arrays = []
         for at, name in enumerate(self._columns):
             kind = self._form.kinds[name][0]
             of = pa.string() if kind == "words" else pa.float64() if kind in ("number", "hex") else pa.int64()
             arrays.append(pa.array([row[at] for row in held], of))
-        return Rows(pa.RecordBatch.from_arrays(arrays, names=self._columns), place, damage.taken())
+        return LogRows(pa.RecordBatch.from_arrays(arrays, names=self._columns), place, damage.taken())
