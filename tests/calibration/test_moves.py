@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from vgyro.calibration.moves import find_moves, gyro_windows, noise_level, runs_of, seems_to_move, window_length
+from vgyro.calibration.moves import find_moves, gyro_windows, noise_level, seems_to_move, window_length
 from vgyro.config import RestOptions
+from vgyro.runs import true_runs
 
 RATE_HZ, SIGMA = 100.0, 0.05
 OPTIONS = RestOptions()
@@ -15,7 +16,7 @@ def moving(rate: np.ndarray, axes: str | None = None, scale: float = 1.0, rate_h
     length = window_length(rate_hz, OPTIONS)
     windows = [gyro_windows(column, length) for column in (rate / scale).T]
     found = find_moves(windows, list(axes or "z" * rate.shape[1]), [scale] * rate.shape[1], OPTIONS)
-    return [(start * length / rate_hz, stop * length / rate_hz) for start, stop in runs_of(found)]
+    return [(start * length / rate_hz, stop * length / rate_hz) for start, stop in true_runs(found).tolist()]
 
 
 def differences(rate: np.ndarray) -> dict:

@@ -9,7 +9,8 @@ from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_table
 from vgyro.tasks.common import Task
 from vgyro.tasks.volatility import assemble, chunk, series
-from vgyro.tasks.volatility.stored import WHOLE, open_series, stored_model
+from vgyro.tasks.volatility.layout import WHOLE, garch_rows, weight_blocks
+from vgyro.tasks.volatility.stored import open_series, stored_model
 from vgyro.volatility import Window, fit_garch, windows
 
 WINDOW, STEP = 120, 50
@@ -233,6 +234,25 @@ def test_a_stored_model_is_that_of_its_window(tables):
     assert model.target[0, 2, 1] == found["dcc"]["target"][3][2]
     window = noise(300, 3)[100:220]
     np.testing.assert_allclose(array.residuals(2), window - window.mean(axis=0), atol=1e-12)
+
+
+def test_rows_that_are_not_of_the_window_are_refused(tables):
+    # Three gyros: with two the rows of window 1 would be the last of window 0 and the first of window 1.
+    folder, _ = tables
+    path = folder / "garch.parquet"
+    assert garch_rows(path, ["gyro"], 1, 3)["gyro"].tolist() == ["g1", "g2", "g3"]
+    with pytest.raises(ValueError, match="window 1 is not where it should be"):
+        garch_rows(path, ["gyro"], 1, 2)
+
+
+def test_blocks_of_weights_begin_where_the_table_says(tables):
+    folder, found = tables
+    blocks, samples = weight_blocks(folder / "weights.parquet")
+    assert samples == 300
+    for (model, mode), first in blocks.items():
+        rows = slice(first, first + samples)
+        assert set(found["weights"]["model"][rows]) == {model}
+        assert set(found["weights"]["mode"][rows]) == {mode}
 
 
 def test_a_long_stretch_stands_for_itself_by_its_beginning(tmp_path, monkeypatch):

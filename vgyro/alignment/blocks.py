@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from scipy import stats
+
+from vgyro.runs import runs
 
 BLOCK_S = 10.0
 SHORTEST_S = 2.0
@@ -20,9 +20,8 @@ def block_numbers(time: np.ndarray, segment: np.ndarray, length_s: float = BLOCK
     A stretch is cut into equal blocks of about length_s.
     """
     number = np.zeros(len(time), dtype=np.int64)
-    edges = np.flatnonzero(np.diff(segment, prepend=segment[:1] - 1, append=segment[-1:] + 1))
     first = 0
-    for start, stop in itertools.pairwise(edges.tolist()):
+    for start, stop in runs(segment).tolist():
         whole = time[stop - 1] - time[start] + 1e-9
         count = max(round(whole / length_s), 1)
         inside = ((time[start:stop] - time[start]) * (count / whole)).astype(np.int64)

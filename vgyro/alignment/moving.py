@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from vgyro.alignment.blocks import BLOCK_S
+from vgyro.runs import runs
 
 COARSE_HZ = 20.0  # rate of the means in which motion is looked for
 MOVING = 1.0  # common power of a block over the power of what the gyros do not share, least
@@ -24,8 +23,7 @@ def moving_rows(rate: np.ndarray, rate_hz: float, segment: np.ndarray) -> np.nda
     factor = max(round(rate_hz / COARSE_HZ), 1)
     length = factor * max(round(BLOCK_S * rate_hz / factor), 4)
     blocks: list[tuple[float, int, int]] = []
-    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(rate)]
-    for start, stop in itertools.pairwise(edges):
+    for start, stop in runs(segment).tolist():
         for first in range(start, stop, length):
             last = min(first + length, stop)
             common, own = _shared(rate[first:last], factor)

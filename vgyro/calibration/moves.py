@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.config import RestOptions
+from vgyro.runs import true_runs
 
 FEWEST_SAMPLES = 16  # in a window: with fewer, a window of noise is several times the quiet level by chance
 FEWEST_WINDOWS = 8
@@ -187,7 +188,7 @@ def _turning(rates: np.ndarray, moving: np.ndarray, least: float) -> np.ndarray:
     Levels are added up from the steps across each motion, so that drift within the stretches does not count; a step
     counts where most gyros agree on it.
     """
-    stretches = runs_of(~moving)
+    stretches = true_runs(~moving).tolist()
     level, levels = 0.0, [0.0]
     for (first, last), (start, stop) in itertools.pairwise(stretches):
         before, after = rates[:, max(first, last - NEAR) : last], rates[:, start : min(stop, start + NEAR)]
@@ -211,15 +212,9 @@ def _median(values: np.ndarray) -> float:
     return float(np.median(values)) if values.size else math.nan
 
 
-def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First place, and one past the last, of each run of what is marked."""
-    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
-
-
 def _long_runs(mask: np.ndarray, shortest: int) -> np.ndarray:
     kept = np.zeros(len(mask), dtype=bool)
-    for start, stop in runs_of(mask):
+    for start, stop in true_runs(mask).tolist():
         kept[start:stop] = stop - start >= shortest
     return kept
 
@@ -227,6 +222,6 @@ def _long_runs(mask: np.ndarray, shortest: int) -> np.ndarray:
 def widened(mask: np.ndarray, by: int) -> np.ndarray:
     """The mask, with `by` more on both sides of each run of what is marked."""
     wide = mask.copy()
-    for start, stop in runs_of(mask):
+    for start, stop in true_runs(mask).tolist():
         wide[max(start - by, 0) : stop + by] = True
     return wide

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 
 from vgyro.config import RestOptions
+from vgyro.runs import runs
 
 STEPS_PER_WINDOW = 4
 QUIET_QUANTILE = 0.1
@@ -39,8 +39,8 @@ def find_rest(
     samples = len(rates)
     length = max(round(options.window_s * rate_hz), FEWEST_SAMPLES)
     step = max(length // STEPS_PER_WINDOW, 1)
-    borders = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), samples] if segment is not None else [0, samples]
-    parts = [np.arange(a, b - length + 1, step) for a, b in itertools.pairwise(borders) if b - a >= length]
+    whole = [[0, samples]] if segment is None else runs(segment).tolist()
+    parts = [np.arange(a, b - length + 1, step) for a, b in whole if b - a >= length]
     if not parts:
         return np.zeros(samples, dtype=bool)
     starts = np.concatenate(parts)
@@ -55,7 +55,7 @@ def find_rest(
     np.add.at(covered, resting, 1)
     np.add.at(covered, resting + length, -1)
     still = np.cumsum(covered, out=covered)[:-1] > 0
-    return _long_stretches(still, borders, round(options.guard_s * rate_hz), round(options.min_duration_s * rate_hz))
+    return _long_stretches(still, segment, round(options.guard_s * rate_hz), round(options.min_duration_s * rate_hz))
 
 
 def _most(scores: np.ndarray) -> np.ndarray:
@@ -112,12 +112,9 @@ def _moments(rate: np.ndarray, middle: float, starts: np.ndarray, ends: np.ndarr
     return np.stack([mean, spread, roughness])
 
 
-def _long_stretches(still: np.ndarray, borders: list[int], guard: int, shortest: int) -> np.ndarray:
-    change = np.diff(still, prepend=False)
-    change[[border for border in borders if border < len(still)]] = True
-    points = [*np.flatnonzero(change).tolist(), len(still)]
+def _long_stretches(still: np.ndarray, segment: np.ndarray | None, guard: int, shortest: int) -> np.ndarray:
     kept = np.zeros(len(still), dtype=bool)
-    for start, stop in itertools.pairwise(points):
+    for start, stop in (runs(still) if segment is None else runs(still, segment)).tolist():
         if still[start] and stop - start - 2 * guard >= max(shortest, 1):
             kept[start + guard : stop - guard] = True
     return kept

@@ -11,6 +11,7 @@ from vgyro import units
 from vgyro.calibration.convert import to_rates
 from vgyro.calibration.figures import VALUE, Finding, not_measured, signed
 from vgyro.calibration.wandering import Errors
+from vgyro.runs import run_starts
 
 FEWEST_KELVIN = 1.0
 FEWEST_TEMPERATURES = 3  # for a slope with limits
@@ -75,7 +76,7 @@ def smooth_temperature(
     """
     temperature = np.asarray(temperature, dtype=float)
     half = max(round(seconds * rate_hz / 2), 1)
-    edges = np.flatnonzero(np.diff(segment)) + 1 if segment is not None else np.empty(0, dtype=int)
+    edges = run_starts(segment)[1:] if segment is not None else np.empty(0, dtype=int)
     return np.concatenate([_running_mean(part, half) for part in np.split(temperature, edges)])
 
 

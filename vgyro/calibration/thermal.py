@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -12,6 +11,7 @@ from vgyro import units
 from vgyro.calibration.figures import Finding, not_measured, signed
 from vgyro.calibration.wandering import Errors, LinearFit, average_fits
 from vgyro.errors import TooShort
+from vgyro.runs import runs
 
 BLOCKS = 150
 SHORTEST_BLOCK_S = 10.0
@@ -90,8 +90,8 @@ def thermal_points(
     warmth = np.broadcast_to(warmth[:, None] if warmth.ndim == 1 else warmth, (samples, gyros))
     seconds = max(samples / rate_hz / BLOCKS, SHORTEST_BLOCK_S) if seconds is None else seconds
     length = max(round(seconds * rate_hz), 1)
-    edges = [0, *([] if segment is None else (np.flatnonzero(np.diff(segment)) + 1).tolist()), samples]
-    starts = np.concatenate([np.arange(a, b - length + 1, length) for a, b in itertools.pairwise(edges)])
+    parts = [[0, samples]] if segment is None else runs(segment).tolist()
+    starts = np.concatenate([np.arange(a, b - length + 1, length) for a, b in parts])
     means = [
         np.array([values[start : start + length].mean(axis=0, dtype=float) for start in starts]).reshape(-1, gyros)
         for values in (counts, warmth)

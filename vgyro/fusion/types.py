@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -16,6 +15,7 @@ from vgyro.errors import DataError
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.parts import PARTS
+from vgyro.runs import runs
 from vgyro.units import arw_deg_s_rt_hz
 from vgyro.validation import did_you_mean
 
@@ -207,9 +207,7 @@ class ArrayRates:
 
     def stretches(self) -> list[slice]:
         """The gap-free stretches, in order."""
-        borders = np.flatnonzero(np.diff(self.segment)) + 1
-        edges = [0, *borders.tolist(), len(self.segment)]
-        return [slice(start, stop) for start, stop in pairwise(edges)]
+        return [slice(start, stop) for start, stop in runs(self.segment).tolist()]
 
 
 @dataclass(frozen=True)

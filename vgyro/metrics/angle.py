@@ -14,6 +14,7 @@ import numpy as np
 from vgyro.metrics.allan.coefficients import Coefficient
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.sampling import Sampling
+from vgyro.runs import runs
 
 WINDOW_S, UNIT_S = 60.0, 1.0
 FEWEST_WINDOWS = 3
@@ -54,11 +55,9 @@ class AngleGrid:
         length = max(round(UNIT_S * sampling.rate_hz), 1)
         unit_s = length / sampling.rate_hz
         units = max(round(window_s / unit_s), 1)
-        borders = np.flatnonzero(np.diff(sampling.stretch)) + 1
-        starts, stops = (np.concatenate([[0], borders]), np.concatenate([borders, [len(sampling)]]))
         none = np.empty(0, dtype=np.int64)
         edges, stretch = [none.reshape(0, 2)], [none]
-        for number, (start, stop) in enumerate(zip(starts.tolist(), stops.tolist(), strict=True)):
+        for number, (start, stop) in enumerate(runs(sampling.stretch).tolist()):
             position = sampling.position[start:stop]
             whole = int(position[-1] - position[0] + 1) // length if stop > start else 0
             at = start + np.searchsorted(position, (position[0] if whole else 0) + length * np.arange(whole + 1))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.runs import run_starts
+
 NORMAL_MAD = 0.6744897501960817  # median of |z| of a normal z
 NORMAL = (0.68, 0.9944578832097531), (0.8, 1.2815515655446004)  # quantiles of |z|
 BLOCK = 512  # samples that share a scale
@@ -132,6 +134,6 @@ def _quantile(spread: np.ndarray, normal: tuple[float, float]) -> np.ndarray:
 
 def _of_another_level(flags: np.ndarray, segment: np.ndarray) -> np.ndarray:
     """Samples of stretches more than half of which are flagged."""
-    first = np.flatnonzero(np.concatenate([[True], segment[1:] != segment[:-1]]))
+    first = run_starts(segment)
     lengths = np.diff(np.append(first, len(flags)))
     return np.repeat(2 * np.add.reduceat(flags, first, dtype=np.int64) > lengths, lengths)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vgyro.runs import run_starts
+
 MOST_LOST_S = 0.5
 
 
@@ -76,7 +78,7 @@ class Sampling:
 
         The last of the edges is one past the last slot; what lay between two stretches is left out.
         """
-        first = np.flatnonzero(np.diff(self.stretch, prepend=self.stretch[:1] - 1))
+        first = run_starts(self.stretch)
         last = np.append(first, len(self))[1:] - 1
         edges = np.concatenate([[0], np.cumsum(self.position[last] - self.position[first] + 1)])
         return self.position + np.repeat(edges[:-1] - self.position[first], last - first + 1), edges

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from vgyro.runs import true_runs
+
 MAX_POINTS = 2000
 GAP = 3.0  # times the usual step
 
@@ -85,9 +87,7 @@ def logarithmic(frequency: np.ndarray, values: np.ndarray, points: int = MAX_POI
 
 def stretches(flag: np.ndarray) -> list[tuple[int, int]]:
     """First and last place of each run of true values of `flag` [T]."""
-    padded = np.concatenate([[False], flag.astype(bool), [False]])
-    changes = np.flatnonzero(padded[1:] != padded[:-1])
-    return [(int(start), int(stop) - 1) for start, stop in zip(changes[::2], changes[1::2], strict=True)]
+    return [(start, stop - 1) for start, stop in true_runs(flag.astype(bool)).tolist()]
 
 
 def broken(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.errors import ConfigError
+from vgyro.runs import run_starts
 
 PIECE = 1 << 18
 """Samples that block means are made of at a time."""
@@ -139,7 +140,7 @@ class BlockMeans:
             return self._numbered(block, values, time, segment)
         if self._present:
             rate = self._with_counts(rate)
-        first = np.flatnonzero(np.diff(block, prepend=-1))
+        first = run_starts(block)
         count = np.diff(first, append=len(block))
         sums = _columns([np.add.reduceat(one, first, dtype=float) if len(first) else one for one in rate], len(first))
         return self._whole(block[first], run[first], count, sums, time[first], segment[first])

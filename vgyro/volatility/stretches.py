@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+
+from vgyro.runs import runs
 
 
 class Window(NamedTuple):
@@ -24,13 +25,7 @@ class Window(NamedTuple):
 
 def stretches(*marks: np.ndarray) -> list[Window]:
     """The runs over which none of the marks [M] changes, in order."""
-    if len(marks[0]) == 0:
-        return []
-    changed = np.zeros(len(marks[0]) - 1, dtype=bool)
-    for mark in marks:
-        changed |= mark[1:] != mark[:-1]
-    edges = [0, *(np.flatnonzero(changed) + 1).tolist(), len(marks[0])]
-    return [Window(start, stop) for start, stop in pairwise(edges)]
+    return [Window(start, stop) for start, stop in runs(*marks).tolist()]
 
 
 @dataclass(frozen=True)

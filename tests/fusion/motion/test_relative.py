@@ -15,12 +15,11 @@ from vgyro.fusion.motion.lowpass import array_delay, pole_times
 from vgyro.fusion.motion.relative import (
     Relative,
     motion_terms,
-    reference,
     relative_response,
     relative_variance,
-    used,
     without_relative,
 )
+from vgyro.fusion.noise.reference_rate import reference, used
 from vgyro.fusion.ours.recommended import recommended, recommended_unsmoothed
 from vgyro.fusion.types import ArrayNoise, ArrayRates, FilterParameters
 

@@ -20,6 +20,7 @@ from vgyro.cli.drafts.sniffing import best_board, board_of_columns, is_dump, log
 from vgyro.config import IntegrityOptions, RestOptions
 from vgyro.dataset import array_board, parse_manifest
 from vgyro.errors import ConfigError, DataError, UsageError
+from vgyro.runs import true_runs
 from vgyro.storage.decode import open_recording
 from vgyro.storage.frames import gather
 from vgyro.storage.inputs import read_board
@@ -252,6 +253,5 @@ def survey(
 def _rest_share(at_rest: np.ndarray, time: np.ndarray) -> tuple[float, list[tuple[float, float]]]:
     if not len(time):
         return 0.0, []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], ~at_rest, [False]]).astype(np.int8)))
-    moving = [(float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    moving = [(float(time[a]), float(time[b - 1])) for a, b in true_runs(~at_rest).tolist()]
     return float(at_rest.mean()), moving

@@ -11,6 +11,7 @@ import numpy as np
 from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
 from vgyro.fusion.types import ArrayRates
+from vgyro.runs import run_starts
 
 MOST_NUMBERS = 8_000_000
 """Blocks × N² at most: those of a larger array are longer."""
@@ -79,7 +80,7 @@ class SlowBlocks:
 
     def pieces(self, rows: slice) -> Iterator[tuple[slice, slice]]:
         """Pieces of the samples `rows`, each in one stretch, and the blocks whose middles lie in and next to each."""
-        begin = np.flatnonzero(np.diff(self.stretch, prepend=-1))
+        begin = run_starts(self.stretch)
         end, middle = np.append(begin[1:], len(self)), self.middle
         borders = self.first[begin]
         inside = borders[(borders > rows.start) & (borders < rows.stop)]

@@ -14,6 +14,7 @@ from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.model import BiasEvidence, Walk, log_likelihood, log_likelihood_slope
 from vgyro.fusion.bias.prior import empirical_prior
 from vgyro.fusion.bias.smoother import Filtered, Information
+from vgyro.runs import run_starts
 
 MOST_BLOCKS, WINDOWS = 1000, 5
 """K is chosen on at most about so many blocks, in windows spread over the recording."""
@@ -237,7 +238,7 @@ def _thinned(blocks: SlowBlocks, crossing: float) -> tuple[np.ndarray, np.ndarra
 
     crossing : blocks in which the fastest walk becomes as large as the white noise. No group reaches over a gap.
     """
-    begin = np.flatnonzero(np.diff(blocks.stretch, prepend=-1))
+    begin = run_starts(blocks.stretch)
     inside = np.arange(len(blocks)) - begin[blocks.stretch]
     most = -(-len(blocks) // MOST_BLOCKS)
     together = int(min(max(crossing / FINENESS, 1.0), most))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.fusion.faults.block_sums import BlockSums
+from vgyro.runs import true_runs
 
 Span = tuple[int, int]
 """Blocks [first, last)."""
@@ -127,8 +128,7 @@ def spans_of(away: np.ndarray) -> list[Spoilt]:
     """Stretches of blocks in which a gyro is away [B, N]."""
     found = []
     for gyro in np.flatnonzero(away.any(axis=0)).tolist():
-        edges = np.flatnonzero(np.diff(away[:, gyro], prepend=False, append=False)).reshape(-1, 2)
-        found += [Spoilt(gyro, int(first), int(last)) for first, last in edges]
+        found += [Spoilt(gyro, first, last) for first, last in true_runs(away[:, gyro]).tolist()]
     return found
 
 

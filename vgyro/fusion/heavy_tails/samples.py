@@ -33,6 +33,7 @@ from vgyro.fusion.heavy_tails.robust_rate import (
 from vgyro.fusion.heavy_tails.scale_mixture import ScaleMixture, fitted, histogram, middles
 from vgyro.fusion.noise.difference_blocks import STUCK_SAMPLES, STUCK_SHARE
 from vgyro.fusion.types import ArrayRates
+from vgyro.runs import run_starts
 
 LOOK, WINDOWS = 1 << 16, 16
 """Samples that are looked at, at most, and windows that they are spread over."""
@@ -114,7 +115,7 @@ def _look(array: ArrayRates, rows: slice) -> RateSamples:
                 used[gyro, max(first - rows.start, 0) : max(last - rows.start, 0)] = False
     used &= ~_stuck(values)
     used &= used.sum(axis=0) > 1
-    return RateSamples(values, used, np.flatnonzero(np.diff(array.segment[rows])) + 1)
+    return RateSamples(values, used, run_starts(array.segment[rows])[1:])
 
 
 def _stuck(values: np.ndarray) -> np.ndarray:

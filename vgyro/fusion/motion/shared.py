@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 
 from vgyro.fusion.motion.evidence import taper_of
+from vgyro.runs import runs
 
 LONGEST = 1 << 17
 """Samples that are looked at."""
@@ -49,8 +49,7 @@ def shared_lines(rate: np.ndarray, segment: np.ndarray, rate_hz: float) -> Calla
 
 def _tapered(rate: np.ndarray, segment: np.ndarray) -> np.ndarray:
     """The longest stretch, without its mean."""
-    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
-    start, stop = max(pairwise(edges), key=lambda part: part[1] - part[0])
+    start, stop = max(runs(segment).tolist(), key=lambda part: part[1] - part[0])
     part = rate[start : min(stop, start + LONGEST)].astype(float)
     taper = taper_of(len(part))
     tapered: np.ndarray = (part - taper @ part / taper.sum()) * taper[:, None]

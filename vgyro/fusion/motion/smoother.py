@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from vgyro.fusion.motion.choice import choose_motion
 from vgyro.fusion.motion.models import UNLIMITED, Activity, Motion, SteadyGain, fixed_bandwidth
 from vgyro.fusion.motion.regimes import Regimes, jumps_at_ends
 from vgyro.fusion.motion.start import wide_start
+from vgyro.runs import runs
 
 __all__ = ["Smoothed", "choose_motion", "fixed_bandwidth", "smooth"]
 
@@ -121,8 +121,7 @@ def mean_variance(r: np.ndarray) -> float:
 
 def stretches(segment: np.ndarray) -> Iterator[slice]:
     """The gap-free stretches, in order."""
-    borders = np.flatnonzero(np.diff(segment)) + 1
-    return (slice(start, stop) for start, stop in pairwise([0, *borders.tolist(), len(segment)]))
+    return (slice(start, stop) for start, stop in runs(segment).tolist())
 
 
 def _check(z: np.ndarray, r: np.ndarray, segment: np.ndarray, rate_hz: float, motion: Motion, phi: float) -> None:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vgyro.fusion.motion.relative import reference, smoothed, smoothing_window, used
 from vgyro.fusion.noise.difference_blocks import BlockMoments, block_moments
+from vgyro.fusion.noise.reference_rate import reference, smoothed, smoothing_window, used
 from vgyro.fusion.noise.variance_model import effective_share
 from vgyro.fusion.samples.quantised import steps
 from vgyro.fusion.types import ArrayRates

@@ -18,10 +18,11 @@ from vgyro.fusion.bias.estimate import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.motion.lowpass import ArrayDelay, array_delay
 from vgyro.fusion.motion.models import Motion
-from vgyro.fusion.motion.relative import Relative, relative_variance, smoothed
+from vgyro.fusion.motion.relative import Relative, relative_variance
 from vgyro.fusion.motion.shared import shared_lines
 from vgyro.fusion.motion.smoother import choose_motion
 from vgyro.fusion.noise.parity import Variances, shared_variances
+from vgyro.fusion.noise.reference_rate import smoothed
 from vgyro.fusion.ours.prepared import prepared
 from vgyro.fusion.samples.missing import unseen
 from vgyro.fusion.samples.quantised import grid, lasting_of_mean, least_variance

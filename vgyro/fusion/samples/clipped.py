@@ -13,6 +13,7 @@ import numpy as np
 from vgyro.fusion.samples.missing import fill_missing
 from vgyro.fusion.samples.quantised import steps
 from vgyro.fusion.types import ArrayRates
+from vgyro.runs import true_runs
 
 FEWEST = 3
 """Samples at an end of the range, at least."""
@@ -74,8 +75,7 @@ def _is_end(array: ArrayRates, gyro: int, at_end: np.ndarray, step: float) -> bo
         return abs(float(np.median(beyond))) > BEYOND * step
     # Two samples are alike by the density of their difference, of √2 times the deviation, at zero.
     chance = min(max(step, float(np.spacing(np.abs(end)))) / (2.0 * math.sqrt(math.pi) * noise), 1.0)
-    edges = np.flatnonzero(np.diff(at_end, prepend=False, append=False))
-    longest = int((edges[1::2] - edges[::2]).max())
+    longest = int(np.diff(true_runs(at_end), axis=1).max())
     unlikely = (longest - 1) * -math.log(chance) > CERTAIN + math.log(len(column))
     return unlikely or int(at_end.sum()) >= PILE * (int(np.count_nonzero(below <= noise)) + 1)
 

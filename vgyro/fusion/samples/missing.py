@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vgyro.runs import true_runs
+
 if TYPE_CHECKING:
     from vgyro.fusion.types import ArrayRates
 
@@ -61,7 +63,7 @@ def unseen(array: ArrayRates) -> np.ndarray | None:
 
 def away(missing: np.ndarray, least: int) -> np.ndarray:
     """Stretches [M, 2] of `least` samples or more in which one gyro has no value; missing [T] of bool."""
-    edges = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2)
+    edges = true_runs(missing)
     return edges[edges[:, 1] - edges[:, 0] >= least]
 
 

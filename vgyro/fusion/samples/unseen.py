@@ -15,6 +15,7 @@ import numpy as np
 from vgyro.fusion.blocks import combined
 from vgyro.fusion.samples.missing import unseen
 from vgyro.fusion.types import ArrayRates, Fused
+from vgyro.runs import true_runs
 
 PART = 0.5
 """Each run counts as so many measurements: the excess over an end is larger, and surer, in a long run."""
@@ -69,7 +70,7 @@ def stand_in(array: ArrayRates, lost: np.ndarray | None) -> StandIn | None:
     mean = combined(array.rate, np.full(array.rate.shape[1], 1.0 / array.rate.shape[1]))
     known = mean[~gone]
     centre, variance = float(np.median(known)), float(np.var(known))
-    edges = np.flatnonzero(np.diff(gone, prepend=False, append=False)).reshape(-1, 2)
+    edges = true_runs(gone)
     length = np.repeat(np.diff(edges, axis=1)[:, 0], np.diff(edges, axis=1)[:, 0])
     places = np.flatnonzero(gone)
     rate, spread = np.full(len(places), centre), np.full(len(places), variance)

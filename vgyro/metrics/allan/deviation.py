@@ -14,6 +14,7 @@ from vgyro.metrics.allan.noise_type import noise_exponents
 from vgyro.metrics.allan.robust import robust_differences, robust_edf, without_far_off
 from vgyro.metrics.allan.slots import SINGLE, SlotSums, variance_of_samples
 from vgyro.metrics.sampling import Sampling
+from vgyro.runs import run_starts, runs
 
 TAUS_PER_OCTAVE = 3
 LONGEST_TAU = 3  # the longest τ is a third of the longest segment
@@ -183,13 +184,13 @@ def averaging_factors(
 
 def edges_of(samples: int, segment: np.ndarray | None) -> np.ndarray:
     """First sample of each run of equal `segment` [T] (None: there is no gap), and T: [S + 1] int."""
-    inner = np.empty(0, np.int64) if segment is None else np.flatnonzero(segment[1:] != segment[:-1]) + 1
-    return np.concatenate([np.zeros(1, np.int64), inner, np.full(int(samples > 0), samples)])
+    starts = np.zeros(1, np.int64) if segment is None or samples == 0 else run_starts(segment)
+    return np.concatenate([starts, np.full(int(samples > 0), samples)])
 
 
 def stretches(segment: np.ndarray) -> list[tuple[int, int]]:
     """First sample, and one past the last, of each run of equal `segment` [T]."""
-    return list(itertools.pairwise(edges_of(len(segment), segment).tolist()))
+    return [(start, stop) for start, stop in runs(segment).tolist()]
 
 
 def split_segments(rate: np.ndarray, segment: np.ndarray | None) -> list[np.ndarray]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vgyro.runs import runs
+
 STILL = 1e-9
 PART = 1 << 16
 MOST_SAMPLES = 1 << 20
@@ -98,11 +100,8 @@ class Truth:
 
 def known_stretches(known: np.ndarray, segment: np.ndarray | None) -> list[tuple[int, int]]:
     """Stretches without a gap among the samples where `known` [T]: first and last + 1, counted in these alone."""
-    change = known[1:] != known[:-1]
-    if segment is not None:
-        change |= segment[1:] != segment[:-1]
-    borders = [0, *(np.flatnonzero(change) + 1).tolist(), len(known)]
-    lengths = [stop - start for start, stop in itertools.pairwise(borders) if stop > start and known[start]]
+    found = runs(known) if segment is None else runs(known, segment)
+    lengths = [stop - start for start, stop in found.tolist() if known[start]]
     return list(itertools.pairwise(np.cumsum([0, *lengths]).tolist()))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from vgyro.metrics.intervals.block_rule import FEWEST_BLOCKS, block_length
 from vgyro.metrics.sampling import Sampling
+from vgyro.runs import run_starts
 
 UNIT_S = 1.0
 UNITS_AT_ONCE = 256
@@ -160,7 +161,7 @@ def _grid(start: np.ndarray, number: np.ndarray, position: np.ndarray, stretch: 
     if samples == 0:
         none = np.zeros(0, np.int64)
         return UnitGrid(none, 0, length, none, none, np.zeros(0), none, per_unit, none, length / rate_hz)
-    heads = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
+    heads = run_starts(stretch)
     of = np.repeat(np.arange(len(heads)), np.diff(np.append(heads, len(stretch))))
     behind = position - position[heads][of]
     slots = (behind + number)[np.append(heads[1:], len(stretch)) - 1]
@@ -171,13 +172,13 @@ def _grid(start: np.ndarray, number: np.ndarray, position: np.ndarray, stretch: 
     place += low[of_run]
     part_at = start[of_run] + np.maximum(place * part - behind[of_run], 0)
     owner = of[of_run]
-    own = np.append(True, (np.diff(place) != 0) | (np.diff(owner) != 0))
+    own = run_starts(place, owner)
     place, part_at, owner = place[own], part_at[own], owner[own]
     # Stretches apart by more than two units, each from a whole unit on.
     room = (-(-slots // length) + 3) * per_unit
     slot = place + (np.cumsum(room) - room)[owner]
     unit = np.minimum(place // per_unit, np.maximum(slots // length, 1)[owner] - 1) + (np.cumsum(room) - room)[owner]
-    first = np.flatnonzero(np.diff(unit, prepend=-1))
+    first = run_starts(unit)
     count = np.diff(np.append(part_at, samples)).astype(float)
     return UnitGrid(part_at[first], samples, length, part_at, slot, count, first, per_unit, owner, length / rate_hz)
 

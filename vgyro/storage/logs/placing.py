@@ -10,6 +10,7 @@ import numpy as np
 
 from vgyro.board import Board
 from vgyro.errors import DataError
+from vgyro.runs import true_runs
 from vgyro.storage.clocks import Clock, ClockOptions, survey
 from vgyro.storage.clocks.model import ClockRecord
 from vgyro.storage.frames import Frames
@@ -166,7 +167,7 @@ class Holes:
             return
         if not empty[0]:
             self._close()
-        for start, stop in runs_of(empty):
+        for start, stop in true_runs(empty).tolist():
             if start or self._begun is None:
                 self._inside |= start > 0
                 self._begun = float(time[start])
@@ -189,10 +190,3 @@ def without_value(columns: Sequence[np.ndarray]) -> np.ndarray:
             return np.zeros(len(values), dtype=bool)
         empty &= np.isnan(values)
     return empty
-
-
-def runs_of(mask: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Start and stop of each run of true."""
-    if mask.any():
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-        yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)

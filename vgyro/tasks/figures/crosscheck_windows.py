@@ -15,9 +15,10 @@ from vgyro.config import Definition, Mode
 from vgyro.engine.independent import nnls_weights
 from vgyro.engine.models import NOT_POSITIVE_DEFINITE, OUTLIER_DOMINATED
 from vgyro.engine.recursions import correlation_target, dcc_log_likelihood, garch_log_likelihood, garch_variance
-from vgyro.storage.tables import read_metadata, read_rows
+from vgyro.storage.tables import read_rows
 from vgyro.tasks.common import Task
 from vgyro.tasks.figures.crosscheck_rows import CrosscheckRow, compare, compare_maximum
+from vgyro.tasks.volatility import layout
 from vgyro.tasks.volatility.stored import ArraySeries, open_series, stored_model
 from vgyro.volatility.check import covariance_after, greatest_log_likelihood
 from vgyro.volatility.rolling import WindowModels, rows_needed, weights_of_windows
@@ -85,9 +86,9 @@ def _fitted(task: Task, garch: Path) -> Fitted:
 
 def garch_rows(one: Fitted, number: int, r: np.ndarray) -> Iterator[CrosscheckRow]:
     """Each gyro's likelihood at our parameters: as stored, and against the greatest that others find."""
-    n, definition = len(one.array.gyros), one.array.definition
+    definition = one.array.definition
     names = ["omega", "alpha", "beta", "log_likelihood", "status"]
-    table = read_rows(one.garch, names, (number + 1) * n, (number + 2) * n)
+    table = layout.garch_rows(one.garch, names, number, len(one.array.gyros))
     gyros = np.flatnonzero(np.isfinite(table["omega"]))
     e = r[:, gyros]
     ours = garch_log_likelihood(e, garch_variance(e, *(table[name][gyros] for name in names[:3])))
@@ -109,7 +110,7 @@ def dcc_rows(
     one: Fitted, number: int, r: np.ndarray, model: WindowModels, gyros: np.ndarray
 ) -> Iterator[CrosscheckRow]:
     """The correlation likelihood at our (a, b), given our margins: as stored, and against the other's maximum."""
-    stored = read_rows(one.dcc, ["a", "b", "log_likelihood", "status"], number + 1, number + 2)
+    stored = layout.dcc_row(one.dcc, ["a", "b", "log_likelihood", "status"], number)
     a, b = float(stored["a"][0]), float(stored["b"][0])
     status = str(stored["status"][0])
     if status == NOT_POSITIVE_DEFINITE or not np.isfinite(stored["log_likelihood"][0]):
@@ -176,8 +177,7 @@ def loop_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels) -> I
 
 def stored_weights(one: Fitted, model: str, mode: str, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
     """Weights [stop - start, N] and sigma of samples start to stop - 1, from their block of weights.parquet."""
-    about = read_metadata(one.weights)
-    first = about["blocks"].index([model, mode]) * about["samples"]
+    first = layout.weight_blocks(one.weights)[0][model, mode]
     names = [f"w_{gyro}" for gyro in one.array.gyros]
     rows = read_rows(one.weights, [*names, "sigma"], first + start, first + stop)
     return np.column_stack([rows[name] for name in names]), rows["sigma"]

@@ -17,7 +17,7 @@ from vgyro.dataset import AT_REST
 from vgyro.fusion import ArrayRates, FilterParameters, SampleWeights, block_of_sample
 from vgyro.fusion.events import FaultEvent, FaultKind
 from vgyro.fusion.types import WeightKey
-from vgyro.storage.tables import ROW_GROUP, read_batches, read_columns, read_metadata, read_rows
+from vgyro.storage.tables import ROW_GROUP, read_batches, read_columns, read_rows
 from vgyro.tasks.common import Task
 from vgyro.tasks.fusion.noise_record import read_noise
 from vgyro.tasks.rates.rates_file import (
@@ -28,6 +28,7 @@ from vgyro.tasks.rates.rates_file import (
     stretch_times,
     thermometers,
 )
+from vgyro.tasks.volatility.layout import weight_blocks
 from vgyro.tasks.volatility.stored import LEVEL, MOVED
 
 T = TypeVar("T")
@@ -138,15 +139,14 @@ def read_weights(
     kinds = ((weights, [f"w_{gyro}" for gyro in gyros]), (deviations, [f"sd_{gyro}" for gyro in gyros]))
     block, last = np.empty(0, dtype=np.int32), None
     for path in paths:
-        metadata = read_metadata(path)
-        count = metadata["samples"]
+        blocks, count = weight_blocks(path)
         if count == 0:
             continue
         # The definitions have one series in common: its map is made once.
         if last is None or not _same_times(path, last):
             block, last = _blocks_of_samples(path, count, file, block_hz), path
-        for place, (model, mode) in enumerate(metadata["blocks"]):
-            key, first = (model, mode, path.parent.name), place * count
+        for (model, mode), first in blocks.items():
+            key = model, mode, path.parent.name
             if _any_known(path, first, count):
                 there = pq.read_schema(path).names
                 for known, columns in ((known, columns) for known, columns in kinds if set(columns) <= set(there)):
@@ -165,7 +165,7 @@ def _blocks_of_samples(path: Path, count: int, file: ArrayFile, block_hz: float)
 
 
 def _same_times(path: Path, other: Path) -> bool:
-    counts = [read_metadata(one)["samples"] for one in (path, other)]
+    counts = [weight_blocks(one)[1] for one in (path, other)]
     times = [rows_in_order(one, ["time"], 0, _slices(counts[0])) for one in (path, other)]
     return counts[0] == counts[1] and all(np.array_equal(*pair) for pair in zip(*times, strict=True))
 

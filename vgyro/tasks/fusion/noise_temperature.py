@@ -12,6 +12,7 @@ from vgyro.board import Board
 from vgyro.fusion.bias.rest_temperature import temperature_at_rest
 from vgyro.fusion.samples.missing import fill_missing
 from vgyro.fusion.types import ArrayNoise, ArrayRates, TemperatureAtRest
+from vgyro.runs import run_starts
 from vgyro.tasks.fusion.noise_record import scales_record
 from vgyro.tasks.rates.block_means import between, block_means
 from vgyro.tasks.rates.rates_file import thermometers
@@ -33,10 +34,9 @@ def slopes_of_file(path: Path, board: Board, gyros: list[str], rate_hz: float, n
     degrees = np.mean([between(means.time, means.values[name]) for name in sensors], axis=0)
     rate = np.column_stack([means.values[name] for name in gyros])
     missing = fill_missing(rate, 1.0 / means.seconds)
-    begin = np.append(0, np.flatnonzero(np.diff(means.segment)) + 1)
     array = ArrayRates(
         rate, 1.0 / means.seconds, means.segment, means.values["at_rest"] == 1.0, noise, temperature=degrees,
-        stretch_time=means.time[begin], missing=missing,
+        stretch_time=means.time[run_starts(means.segment)], missing=missing,
     )  # fmt: skip
     found = temperature_at_rest(array) if np.isfinite(degrees).all() else None
     return {} if found is None else {"temperature": _record(found)}

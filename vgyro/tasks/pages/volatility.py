@@ -15,9 +15,9 @@ import pyarrow.parquet as pq
 from vgyro.report.envelope import places_of
 from vgyro.report.model import DccSummary, GarchSummary, VolatilityPart, WeightCurves, rows_of
 from vgyro.report.volatility.section import LEVEL_OF_TEST
-from vgyro.storage.tables import read_columns, read_metadata
+from vgyro.storage.tables import read_columns
+from vgyro.tasks.volatility.layout import WHOLE, weight_blocks
 
-WHOLE = -1
 CURVE_POINTS = 600
 
 
@@ -80,12 +80,11 @@ def read_dcc(path: Path) -> DccSummary:
 
 def read_weights(path: Path, gyros: tuple[str, ...]) -> tuple[WeightCurves, ...]:
     """Some samples of every model and mode, and the statuses of all."""
-    metadata = read_metadata(path)
-    samples = int(metadata["samples"])
+    blocks, samples = weight_blocks(path)
     shown = ["time", "sigma", *(f"w_{name}" for name in gyros), *(f"sd_{name}" for name in gyros)]
     file = pq.ParquetFile(path)
-    parts: list[list[pa.Table]] = [[] for _ in metadata["blocks"]]
-    counts: list[Counter[str]] = [Counter() for _ in metadata["blocks"]]
+    parts: list[list[pa.Table]] = [[] for _ in blocks]
+    counts: list[Counter[str]] = [Counter() for _ in blocks]
     places = places_of(samples, CURVE_POINTS)
     begin = 0
     for group in range(file.num_row_groups):
@@ -100,7 +99,7 @@ def read_weights(path: Path, gyros: tuple[str, ...]) -> tuple[WeightCurves, ...]
         begin += rows
     return tuple(
         WeightCurves(model, mode, _arrays(tables, shown), dict(count.most_common()))
-        for (model, mode), tables, count in zip(metadata["blocks"], parts, counts, strict=True)
+        for (model, mode), tables, count in zip(blocks, parts, counts, strict=True)
     )
 
 

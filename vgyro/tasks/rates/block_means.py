@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vgyro.board import Board, Temperature
+from vgyro.runs import run_starts
 from vgyro.storage.tables import read_batches
 
 HALF = 0.5
@@ -63,9 +64,7 @@ def _hide_clipped(columns: dict[str, np.ndarray], rails: Mapping[str, tuple[floa
 
 def _starts(columns: dict[str, np.ndarray], seconds: float) -> np.ndarray:
     """Rows where a block begins; the last of them may go on in the next piece."""
-    number, segment = np.floor(columns["time"] / seconds), columns["segment"]
-    new = (np.diff(number, prepend=np.nan) != 0) | (np.diff(segment, prepend=np.nan) != 0)
-    return np.flatnonzero(new)
+    return run_starts(np.floor(columns["time"] / seconds), columns["segment"])
 
 
 def _means(columns: dict[str, np.ndarray], starts: np.ndarray, names: list[str]) -> np.ndarray:

@@ -16,13 +16,13 @@ from vgyro.calibration import (
     find_moves,
     gyro_windows,
     noise_level,
-    runs_of,
     seems_to_move,
     widened,
     window_length,
 )
 from vgyro.config import RestOptions
 from vgyro.dataset import AT_REST, Recording
+from vgyro.runs import true_runs
 from vgyro.storage.tables import read_column
 
 
@@ -65,7 +65,10 @@ def moves_of(
     guarded = widened(moving, math.ceil(options.guard_s / options.window_s))
     # What is left over at the end is in no window: it is as the last one.
     window = np.minimum(np.arange(len(time)) // length, len(moving) - 1)
-    edges = [(start * length, len(time) if stop == len(moving) else stop * length) for start, stop in runs_of(moving)]
+    edges = [
+        (start * length, len(time) if stop == len(moving) else stop * length)
+        for start, stop in true_runs(moving).tolist()
+    ]
     share = sum(stop - start for start, stop in edges) / len(time)
     return Moves(
         ~guarded[window],

@@ -15,6 +15,7 @@ from vgyro.board import Board
 from vgyro.errors import DataError
 from vgyro.fusion.samples.missing import fill_missing
 from vgyro.metrics.sampling import Sampling
+from vgyro.runs import run_starts
 from vgyro.storage.tables import read_batches, read_column, read_metadata
 from vgyro.tasks.rates.block_means import between
 
@@ -61,7 +62,7 @@ class ArrayFile:
 
     def sampling(self, most_lost_s: float) -> Sampling:
         """When all samples were taken; losses up to most_lost_s, s, do not end a stretch. Reads the times."""
-        border = np.flatnonzero(self.segment[1:] != self.segment[:-1]) + 1
+        border = run_starts(self.segment)[1:]
         time = self.time
         steps = np.rint((time[border] - time[border - 1]) * self.rate_hz).astype(np.int64)
         del time
@@ -166,7 +167,7 @@ def _interpolated(file: ArrayFile, columns: list[str]) -> np.ndarray | None:
 
 def stretch_times(file: ArrayFile) -> np.ndarray:
     """Time of the first sample of each gap-free stretch [S], s."""
-    return times_at(file.path, np.append(0, np.flatnonzero(np.diff(file.segment)) + 1))
+    return times_at(file.path, run_starts(file.segment))
 
 
 def times_at(path: Path, samples: Sequence[int] | np.ndarray) -> np.ndarray:

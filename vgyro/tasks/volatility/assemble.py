@@ -25,7 +25,8 @@ from vgyro.tasks.volatility.columns import (
     with_p_values,
 )  # fmt: skip
 from vgyro.tasks.volatility.fits_map import FitsMap
-from vgyro.tasks.volatility.stored import WHOLE, ArraySeries, open_series
+from vgyro.tasks.volatility.layout import WHOLE
+from vgyro.tasks.volatility.stored import ArraySeries, open_series
 from vgyro.volatility.fits import fit_windows
 from vgyro.volatility.windowed import MIN_SAMPLES
 

@@ -15,9 +15,10 @@ import pyarrow as pa
 from vgyro import engine as engines
 from vgyro.config import CrossCheckOptions, Definition
 from vgyro.engine.models import BOUNDARY_MARGIN, CONVERGED
-from vgyro.storage.tables import read_rows, write_table
+from vgyro.storage.tables import write_table
 from vgyro.tasks.common import Task, run_task
 from vgyro.tasks.volatility.columns import place_columns
+from vgyro.tasks.volatility.layout import dcc_row, garch_rows
 from vgyro.tasks.volatility.stored import ArraySeries, open_series, stored_model
 from vgyro.volatility.bekk import BekkFit, bekk_covariance, fit_bekk
 from vgyro.volatility.rolling import WindowModels
@@ -113,11 +114,10 @@ def window_rows(array: ArraySeries, garch: Path, dcc: Path, number: int) -> Iter
 
 def read_sample(array: ArraySeries, garch: Path, dcc: Path, number: int) -> Sample:
     """A window, the samples of the step after it, and its fits."""
-    n = len(array.gyros)
     window, plan = array.window(number), array.plan
     model = stored_model(array, garch, dcc, number)
     gyros = np.isfinite(model.omega[0])
-    stored = read_rows(garch, ["log_likelihood", "status"], (number + 1) * n, (number + 2) * n)
+    stored = garch_rows(garch, ["log_likelihood", "status"], number, len(array.gyros))
     begin, stop = int(plan.stretch_start[number]), min(window.stop + plan.step, int(plan.stretch_stop[number]))
     first = max(begin, window.start - 1)
     values, time = array.table(first, stop)
@@ -138,7 +138,7 @@ def read_sample(array: ArraySeries, garch: Path, dcc: Path, number: int) -> Samp
 def engine_rows(array: ArraySeries, sample: Sample, dcc: Path, number: int) -> Iterator[BekkRow]:
     """CCC and DCC, as they are stored: the margins' log-likelihoods and that of the correlation."""
     n = int(sample.gyros.sum())
-    stored = read_rows(dcc, ["log_likelihood", "log_likelihood_ccc", "status"], number + 1, number + 2)
+    stored = dcc_row(dcc, ["log_likelihood", "log_likelihood_ccc", "status"], number)
     margins = float(sample.likelihood.sum())
     steady = CONVERGED if (sample.status == CONVERGED).all() else BOUNDARY_MARGIN
     for name, column, own, status in (

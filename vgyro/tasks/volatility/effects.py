@@ -9,9 +9,10 @@ from dataclasses import fields
 import numpy as np
 
 from vgyro.config import MetricsOptions
-from vgyro.storage.tables import read_columns, read_metadata, read_rows, write_table
+from vgyro.storage.tables import read_columns, read_metadata, write_table
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.volatility.stored import WHOLE, open_series
+from vgyro.tasks.volatility.layout import WHOLE, garch_rows
+from vgyro.tasks.volatility.stored import open_series
 from vgyro.volatility.effects.kinds import GarchEffect, RateTone, Sampled
 from vgyro.volatility.effects.verdicts import Effect, explain_array
 
@@ -51,9 +52,7 @@ def read_garch(task: Task, gyros: int) -> dict[str, GarchEffect]:
     """Gyro → GARCH(1,1) of the longest stretch; none if the level is not analysed."""
     if not task.inputs.get("garch"):
         return {}
-    rows = read_rows(task.input("garch"), ["window", "gyro", "omega", "alpha", "beta"], 0, gyros)
-    if not np.all(rows["window"] == WHOLE):
-        raise ValueError(f"the first rows of {task.input('garch')} are not the longest stretch")
+    rows = garch_rows(task.input("garch"), ["gyro", "omega", "alpha", "beta"], WHOLE, gyros)
     return {str(gyro): GarchEffect(*(float(rows[name][row]) for name in ("omega", "alpha", "beta")))
             for row, gyro in enumerate(rows["gyro"])}  # fmt: skip
 

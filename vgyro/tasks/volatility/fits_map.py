@@ -6,7 +6,8 @@ import numpy as np
 import pyarrow as pa
 
 from vgyro.engine.models import DCC_STATUSES, GARCH_STATUSES
-from vgyro.tasks.volatility.stored import WHOLE, ArraySeries
+from vgyro.tasks.volatility.layout import WHOLE
+from vgyro.tasks.volatility.stored import ArraySeries
 
 BINS = 100
 DCC = "dcc"

@@ -14,13 +14,12 @@ from vgyro.engine.models import DCC_STATUSES, GARCH_STATUSES, DccWindows, GarchW
 from vgyro.errors import ConfigError
 from vgyro.storage.tables import read_metadata, read_rows
 from vgyro.tasks.common import Task
+from vgyro.tasks.volatility.layout import WHOLE, dcc_row, garch_rows
 from vgyro.volatility.fits import WindowFits, window_models
 from vgyro.volatility.rolling import WindowModels
 from vgyro.volatility.stretches import RollingWindows, Window, rolling_windows
 from vgyro.volatility.windowed import fitted_residuals
 
-WHOLE = -1
-"""Number of the window that is the longest stretch of the record."""
 WHOLE_SAMPLES = 1_000_000
 """Of a longer stretch, that window is the first so many samples."""
 SLAB = 1 << 20
@@ -127,12 +126,9 @@ def open_series(task: Task, name: str = "series") -> ArraySeries:
 
 def stored_model(array: ArraySeries, garch_path: Path, dcc_path: Path, number: int) -> WindowModels:
     """The model of one window, as garch.parquet and dcc.parquet hold it."""
-    n, row = len(array.gyros), number + 1
-    names = ["window", "omega", "alpha", "beta", "status"]
-    garch = read_rows(garch_path, names, row * n, (row + 1) * n)
-    dcc = read_rows(dcc_path, ["window", "a", "b", "target", "status"], row, row + 1)
-    if not np.all(garch["window"] == number) or dcc["window"][0] != number:
-        raise ValueError(f"window {number} is not where it should be in {garch_path} and {dcc_path}")
+    n = len(array.gyros)
+    garch = garch_rows(garch_path, ["omega", "alpha", "beta", "status"], number, n)
+    dcc = dcc_row(dcc_path, ["a", "b", "target", "status"], number)
     target = np.eye(n)
     target[np.triu_indices(n, 1)] = dcc["target"][0]
     target = np.triu(target) + np.triu(target, 1).T

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from vgyro.fusion.events import FaultKind
 from vgyro.fusion.faults.candidate import SuspectedFault, lengths_up_to, running_sum
 from vgyro.fusion.faults.levels.change import LevelChange, fit_change, hinge, lasting_change, run_of
 from vgyro.fusion.faults.levels.drift_variance import Slow, contrasts
+from vgyro.runs import runs
 
 LEAST_SIZE = 2.5
 """Least fault in standard deviations of a block mean: what is smaller, the bias estimate of the fusion follows."""
@@ -68,9 +67,8 @@ def _contrast(slow: Slow, least: float) -> tuple[float, int, int]:
 
 
 def _long_runs(slow: Slow) -> list[tuple[int, int]]:
-    run, counted = slow.run, running_sum(slow.counts)
-    edges = np.flatnonzero(np.diff(run, prepend=run[0] - 1, append=run[-1] + 1)).tolist()
-    return [(low, high) for low, high in pairwise(edges) if counted[high] - counted[low] >= FEWEST_BLOCKS]
+    counted = running_sum(slow.counts)
+    return [(low, high) for low, high in runs(slow.run).tolist() if counted[high] - counted[low] >= FEWEST_BLOCKS]
 
 
 def _windows(blocks: int) -> list[tuple[int, int]]:

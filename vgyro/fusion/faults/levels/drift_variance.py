@@ -8,6 +8,7 @@ import numpy as np
 
 from vgyro.fusion.faults.candidate import running_sum, spread
 from vgyro.fusion.faults.residuals import Residuals
+from vgyro.runs import run_starts, true_runs
 
 HIGH_SHARE = 0.8
 HIGH_SQUARE = 1.642
@@ -62,10 +63,8 @@ def slow_part(found: Residuals, gyro: int, counts: np.ndarray, run: np.ndarray, 
     What does not count at an end of a run is a run of its own, of which nothing is known.
     """
     mean = mean.copy()
-    begins = np.flatnonzero(np.diff(run, prepend=run[0] - 1))
-    borders = {int(one) for one in (*begins, len(run))}
-    holes = np.flatnonzero(np.diff(counts, prepend=True, append=True)).reshape(-1, 2) if counts.any() else ()
-    for first, last in ((int(low), int(high)) for low, high in holes):
+    borders = {*run_starts(run).tolist(), len(run)}
+    for first, last in true_runs(~counts).tolist() if counts.any() else ():
         near = slice(max(0, first - EDGE), first), slice(last, last + EDGE)
         before, after = (_middle(mean[rows][counts[rows]]) for rows in near)
         ends = (after if np.isnan(before) else before, before if np.isnan(after) else after)

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
 from vgyro.fusion.faults.candidate import lengths_up_to
 from vgyro.fusion.faults.levels.drift_variance import Slow
+from vgyro.runs import runs
 
 POINTS = 96
 FEWEST_POINTS = 4
@@ -150,8 +150,7 @@ def likelihood_of(slow: Slow) -> Likelihood:
 
 
 def _runs(run: np.ndarray) -> list[slice]:
-    edges = [0, *(np.flatnonzero(np.diff(run)) + 1).tolist(), len(run)]
-    return [slice(begin, end) for begin, end in pairwise(edges)]
+    return [slice(begin, end) for begin, end in runs(run).tolist()]
 
 
 def _coarse(slow: Slow, rows: slice, length: int) -> tuple[np.ndarray, np.ndarray] | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.types import ArrayRates
+from vgyro.runs import true_runs
 
 SAME = 1e-3
 """Two changes from one sample to the next are one if they differ by less than this share of the usual change: a
@@ -106,7 +107,7 @@ def _stretches(array: ArrayRates, pair: _Pair, chance: float) -> list[tuple[int,
     tolerance = SAME * pair.usual + ROUNDINGS * float(np.finfo(theirs.dtype).eps) * float(np.abs(theirs).max())
     same = np.abs(follows - pair.factor * step) <= tolerance
     changed = np.concatenate([[0], np.cumsum((step != 0) | (follows != 0))])
-    edges = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+    edges = true_runs(same)
     needed = (CERTAIN + math.log(samples)) / -math.log(chance)
     counts = changed[edges[:, 1]] - changed[edges[:, 0]]
     long = (counts >= needed) & (edges[:, 1] - edges[:, 0] >= SHORTEST_S * array.rate_hz)

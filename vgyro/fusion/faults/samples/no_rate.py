@@ -10,6 +10,7 @@ import numpy as np
 from vgyro.fusion.events import FaultEvent, FaultKind
 from vgyro.fusion.samples.quantised import steps
 from vgyro.fusion.types import ArrayRates
+from vgyro.runs import true_runs
 
 SHORTEST_S = 1.0
 RAREST = 1e-9
@@ -165,7 +166,7 @@ def _missing(column: np.ndarray) -> Iterator[tuple[int, int]]:
     """Runs of samples without a number."""
     for first in range(0, len(column), PIECE):
         if np.isnan(column[first : first + PIECE]).any():
-            yield from ((int(start), int(stop)) for start, stop in _marked(np.isnan(column)))
+            yield from ((int(start), int(stop)) for start, stop in true_runs(np.isnan(column)))
             return
 
 
@@ -174,7 +175,7 @@ def _long_gone(gone: np.ndarray, rate_hz: float) -> Iterator[tuple[int, int]]:
 
     gone : [T] where one gyro has no value, and was filled in.  Shorter ones are filled in well enough.
     """
-    runs = _marked(gone)
+    runs = true_runs(gone)
     if not len(runs):
         return
     lengths = runs[:, 1] - runs[:, 0]
@@ -183,11 +184,6 @@ def _long_gone(gone: np.ndarray, rate_hz: float) -> Iterator[tuple[int, int]]:
     usual = TIMES_USUAL * float(np.median(lengths)) if slow else 0.0
     for start, stop in runs[lengths >= max(SHORTEST_S * rate_hz, usual)]:
         yield int(start), int(stop)
-
-
-def _marked(mask: np.ndarray) -> np.ndarray:
-    """First place, and one past the last, of each run of what is marked [M, 2]."""
-    return np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))).reshape(-1, 2)
 
 
 def _empty(gyro: int, start: int, stop: int) -> FaultEvent:
