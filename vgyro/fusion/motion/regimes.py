@@ -103,7 +103,7 @@ def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -
     F, Q = dynamics.transition.copy(), dynamics.process.copy()
     F[:states, :states], Q[:states, :states] = np.eye(states), 0.0
     Q[0, 0] = rest.parameters["q"] / rest.rate_hz
-    if motion.model in ("acceleration", "jerk", "oscillator"):
+    if dynamics.order[:states].any():
         F[1:states, :states] = 0.0
         F[0, :states] = dynamics.reads[:states]
         Q[1:states, 1:states] = np.diag(_known_derivatives(motion, dynamics, density)[1:states])
@@ -114,10 +114,10 @@ def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np
     """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
 
     With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero;
-    of two of them all that is known is how large the derivatives are.
+    of two of them, and of other models, all that is known is how large the derivatives are.
     """
     values = motion.parameters
-    if "second_hz" in values:
+    if "second_hz" in values or motion.model not in ("acceleration", "jerk", "oscillator"):
         return np.diagonal(dynamics.stationary)
     if motion.model == "oscillator":
         q = 4.0 * values["damping"] * (2.0 * math.pi * values["frequency_hz"]) ** 3 * values["sd"] ** 2

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.fusion.motion.density import FAMILIES, LINE, PAIR, DensityFamily, of_line, pair_power
+from vgyro.fusion.motion import density, models
+from vgyro.fusion.motion.density import LINE, PAIR, MotionFamily, of_line, pair_power
 from vgyro.fusion.motion.evidence import RateSpectrum
 from vgyro.fusion.motion.models import SpectralLine
 
@@ -62,9 +63,10 @@ def search(spectrum: RateSpectrum, family: str, lines: tuple[SpectralLine, ...],
     crossing : frequency at which rate and noise are alike, about
     """
     beside = _of_lines(spectrum, lines)
-    grid = _GRIDS[family](spectrum, crossing)
-    signals = FAMILIES[family].density({name: grid[:, [k]] for k, name in enumerate(FAMILIES[family].names)},
-                                       spectrum.frequency, spectrum.rate_hz)  # fmt: skip
+    kind = FAMILIES[family]
+    grid = kind.starts(spectrum, crossing)
+    values = {name: grid[:, [place]] for place, name in enumerate(kind.names)}
+    signals = kind.density(values, spectrum.frequency, spectrum.rate_hz)
     risks = spectrum.risk(signals + beside)
     return min(
         (refine(spectrum, family, grid[place], lines) for place in np.argsort(risks)[:KEPT].tolist()),
@@ -85,8 +87,8 @@ def refine(
     """
     kind = FAMILIES.get(family)
     names = kind.names if kind else ()
-    bounds = _bounds(spectrum)
-    ends = [bounds[name] for name in names] + [one for line in lines for one in _line_bounds(spectrum, line)]
+    bounds = bounds_of(spectrum)
+    ends = [bounds[name] for name in names] + [one for line in lines for one in _linebounds_of(spectrum, line)]
     low, high = np.log(ends).T
     logs = np.clip(np.log([*start, *(getattr(line, name) for line in lines for name in LINE)]), low, high)
 
@@ -135,7 +137,7 @@ def _descend(
 
 
 def _signal(
-    spectrum: RateSpectrum, kind: DensityFamily | None, lines: tuple[SpectralLine, ...], values: np.ndarray
+    spectrum: RateSpectrum, kind: MotionFamily | None, lines: tuple[SpectralLine, ...], values: np.ndarray
 ) -> np.ndarray:
     whole = _of_lines(spectrum, lines)
     if kind is None:
@@ -167,7 +169,8 @@ def signal_of(spectrum: RateSpectrum, fit: MotionFit, lines: tuple[SpectralLine,
     return _signal(spectrum, FAMILIES.get(fit.family), lines, np.array(list(fit.values.values())))
 
 
-def _bounds(spectrum: RateSpectrum) -> dict[str, tuple[float, float]]:
+def bounds_of(spectrum: RateSpectrum) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of a parameter, by its name, for a recording with this spectrum."""
     lowest = spectrum.frequency[0]
     hertz = (0.01 * lowest, FASTEST * spectrum.rate_hz)
     size = math.sqrt(float(spectrum.noise.mean()) * spectrum.rate_hz)
@@ -177,10 +180,10 @@ def _bounds(spectrum: RateSpectrum) -> dict[str, tuple[float, float]]:
     }  # fmt: skip
 
 
-def _line_bounds(spectrum: RateSpectrum, line: SpectralLine) -> tuple[tuple[float, float], ...]:
+def _linebounds_of(spectrum: RateSpectrum, line: SpectralLine) -> tuple[tuple[float, float], ...]:
     """Of frequency, damping and s.d.: a line stays where it was found."""
     middle = min(max(line.frequency_hz, spectrum.frequency[0]), LINES_END * spectrum.rate_hz)
-    return (middle / NEAR, middle * NEAR), LINE_DAMPING, _bounds(spectrum)["sd"]
+    return (middle / NEAR, middle * NEAR), LINE_DAMPING, bounds_of(spectrum)["sd"]
 
 
 def crossing_of(spectrum: RateSpectrum, signal: np.ndarray) -> float:
@@ -247,13 +250,13 @@ def _pair_grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:
     return np.stack([own, damping, second, loss, np.sqrt(power)], axis=1)
 
 
-_GRIDS = {
-    "random_walk": _driven_grid(1),
-    "acceleration": _driven_grid(2),
-    "jerk": _driven_grid(3),
-    "markov": _markov_grid,
-    "resonance": _resonance_grid,
-    "oscillator": _oscillator_grid,
-    "pair": _pair_grid,
+FAMILIES = {
+    "random_walk": MotionFamily("random_walk", ("q",), models.driven(1), density.walk, _driven_grid(1), 1),
+    "acceleration": MotionFamily("acceleration", ("q",), models.driven(2), density.driven(2), _driven_grid(2), 2),
+    "jerk": MotionFamily("jerk", ("q",), models.driven(3), density.driven(3), _driven_grid(3), 3),
+    "markov": MotionFamily("markov", ("tau_s", "sd"), models.markov, density.markov, _markov_grid, 1),
+    "resonance": MotionFamily("oscillator", LINE, models.resonator, density.resonance, _resonance_grid, 2),
+    "oscillator": MotionFamily("oscillator", (*LINE, "q"), models.oscillator, density.oscillator, _oscillator_grid, 2),
+    "pair": MotionFamily("oscillator", PAIR, models.pair, density.pair, _pair_grid, 2),
 }
-assert FAMILIES["pair"].names == PAIR
+"""The models of the rate, by the name of what is searched for: three of them are kinds of the model oscillator."""
