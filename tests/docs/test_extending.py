@@ -18,7 +18,14 @@ from vgyro.board import parse_board
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = sections((ROOT / "docs/extending.md").read_text(encoding="utf-8"))
 FOLLOWED = [title for title, section in GUIDE.items() if section.changes]
-COPIED = ("vgyro", "tests", "config", "docs", "pyproject.toml", "README.md")
+BESIDE = {
+    "A new family of logs": ["tests/storage/logs/test_families.py", "tests/cli/test_documents.py"],
+    "A new fusion method": ["tests/fusion/test_methods.py", "tests/cli/test_documents.py"],
+    "A new model of the motion": ["tests/fusion/motion/test_spectrum.py"],
+    "A new definition of r_t": ["tests/volatility/test_series.py"],
+}
+"""Tests that are there already and look at everything that is entered; run once after each section."""
+COPIED = ("vgyro", "tests", "config", "docs", "workflow", "Snakefile", "pyproject.toml", "README.md")
 NOT_COPIED = shutil.ignore_patterns("__pycache__", "*.png", "cases")
 
 
@@ -60,11 +67,12 @@ def test_every_usual_wish_has_a_section():
 def test_a_section_works_as_it_is_printed(copy, title):
     section = GUIDE[title]
     section.follow(copy)
-    code, said = run(copy, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", section.test)
-    assert code == 0, said
-    assert re.search(r"^\d+ passed in", said, re.MULTILINE), said
     code, said = run(copy, "-m", "vgyro.cli.documents")
     assert code == 0, said
+    tests = [section.test, *BESIDE.get(title, [])]
+    code, said = run(copy, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests)
+    assert code == 0, said
+    assert re.search(r"^\d+ passed in", said, re.MULTILINE), said
     style = ["check", "--quiet", *section.files, *(change.path for change in section.changes)]
     code, said = run(copy, "-m", "ruff", "--config", str(ROOT / "pyproject.toml"), *style)
     assert code == 0, said
