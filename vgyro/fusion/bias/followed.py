@@ -49,13 +49,17 @@ COURSES = (Course("settle, as in a warm-up, in about", lambda since, tau: np.exp
 
 @dataclass(frozen=True)
 class Followed:
-    """The model of the biases.
+    """The model of the biases of one recording, chosen by the likelihood.
 
-    regressor : [B], K or 1, what the slopes are multiplied by; None: nothing was looked for
-    reference : temperature at which it is zero, °C
-    course    : what the regressor is a course in time of; None: it is none;  tau_s : its time constant, s
-    known     : what a record at rest knows of the slopes, where it is used;  common : variance of a walk all share
-    note      : what was not looked for, or not believed
+    evidence  : the block means with the regressor;  choice : the walks, and whether the slopes were believed
+    common    : (deg/s)²/s, covariance rate of a random walk that all gyros share; 0: none is seen
+    regressor : [B], what the slopes are multiplied by: temperature less `reference` in K, or a course in time of the
+                size of 1; None: nothing was looked for
+    reference : °C, temperature at which the regressor is zero
+    known     : slopes from a record at rest, where they are used; None: they are not
+    course    : the course in time that the regressor is; None: it is a temperature, or nothing
+    tau_s     : time constant of the course, s; NaN without one
+    note      : what was not looked for, or not believed, and why
     """
 
     evidence: BiasEvidence
@@ -71,10 +75,12 @@ class Followed:
 
 @dataclass(frozen=True)
 class BiasCase:
-    """One recording.
+    """One recording of N gyros in B blocks, for which a model of the biases is to be chosen.
 
-    variance : [B, N] of a sample;  correlation : [N, N] of the noise;  resting : [B], blocks at rest for certain
-    arw      : [N], about;  walk : the random walks; None: they are chosen
+    variance    : [B, N], (deg/s)², variance of the white noise of a sample;  correlation : [N, N] of that noise
+    resting     : [B] of bool, the board stands still in the whole block for certain
+    arw         : [N], deg/s/√Hz, white noise of each gyro in most blocks
+    walk        : the random walks; None: they are chosen
     """
 
     array: ArrayRates

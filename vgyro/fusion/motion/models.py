@@ -45,10 +45,11 @@ class SpectralLine:
 
 @dataclass(frozen=True)
 class MotionCandidate:
-    """How well a model smooths.
+    """One of the models that were compared, and how well it smooths the recording.
 
-    risk : squared error of the smoother, estimated, in units of the noise, summed
-    cost : risk + what the parameters cost
+    model, parameters, lines : as in Motion
+    risk : estimated squared error of its smoother, summed over the recording, in units of the variance of the noise
+    cost : risk plus what its parameters cost; the model of the least cost is taken
     """
 
     model: str
@@ -97,10 +98,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Activity:
-    """How lively the rate is, beside its model.
+    """How lively the rate is from time to time, beside what its model says.
 
-    level : [T] of uint8;  width : [M], what the bandwidth of the smoother is multiplied by at each level, about
-    order : the bandwidth goes with the 2·order-th root of the process noise
+    level : [T] of uint8, number of the level of each sample
+    width : [M], for each level the factor by which the bandwidth of the smoother changes, about; 1: as the model says
+    order : the bandwidth goes with the 2·order-th root of the process noise, which therefore changes by width^(2·order)
     """
 
     level: np.ndarray
@@ -128,10 +130,15 @@ class Activity:
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Of n states: transition F and process Q [n, n], reads h [n] (the rate is h'x).
+    """How the rate moves from one sample to the next: a linear model of n states, all in deg/s.
 
-    stationary : [n, n] covariance of the states that have one; NaN on its diagonal: of a state that wanders
-    order      : [n] which derivative of the rate the state is
+    transition : [n, n], F: the state at a sample is F times the one before, plus noise of the covariance `process`
+    process    : [n, n], (deg/s)², Q
+    reads      : [n], h: the rate is h'·state
+    stationary : [n, n], (deg/s)², covariance of the states that have one in the long run; NaN on the diagonal for a
+                 state that wanders without a limit
+    order      : [n], which derivative of the rate a state is: 0 for a part of the rate itself, 1 for its derivative
+                 times the sample period, and so on
     """
 
     transition: np.ndarray

@@ -16,10 +16,11 @@ JUMP = 5.0
 
 @dataclass(frozen=True)
 class Regimes:
-    """M ways from one sample to the next of n states.
+    """The dynamics of the rate where they change from sample to sample: M kinds of steps between the n states.
 
-    transition, process : F and Q [M, n, n];  of_step [T] of uint8 : which of them leads to each sample
-    calibration [K], of_sample [T] : what the variance of the smoothed rate is multiplied by at each sample
+    transition  : [M, n, n], F of each kind of step;  process : [M, n, n], (deg/s)², Q of each
+    of_step     : [T] of uint8, which kind of step leads to each sample
+    calibration : [K], factors for the variance of the smoothed rate;  of_sample : [T] of uint8, which of them holds
     """
 
     transition: np.ndarray

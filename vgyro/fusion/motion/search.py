@@ -34,9 +34,11 @@ WIDEST = 1.5
 
 @dataclass(frozen=True)
 class MotionFit:
-    """A family with its parameters, and the lines beside it that have a width.
+    """A model of the rate, and lines that have a width, fitted together to the spectrum of one recording.
 
-    signal : S [F];  risk : as estimated;  price : of the parameters
+    family : name in FAMILIES; "": a rate that does not move but for the lines;  values : its parameters by name
+    lines  : vibrations beside it;  signal : [F], deg²/s, two-sided density of all of it at the bands of the spectrum
+    risk   : estimated squared error of its smoother, in units of the variance of the noise;  price : of its parameters
     """
 
     family: str
@@ -58,9 +60,11 @@ def still(spectrum: RateSpectrum, lines: tuple[SpectralLine, ...] = ()) -> Motio
 
 
 def search(spectrum: RateSpectrum, family: str, lines: tuple[SpectralLine, ...], crossing: float) -> MotionFit:
-    """Least risk of a family beside the lines, whose parameters are then searched with it.
+    """Fit a model to a spectrum: try all its starts, go on from the KEPT best, and return the fit of the least cost.
 
-    crossing : frequency at which rate and noise are alike, about
+    spectrum : of the fused rate, in bands;  family : name in FAMILIES
+    lines    : vibrations beside the model, whose parameters are fitted with it
+    crossing : frequency in Hz at which rate and noise are alike, about, from which starts are made
     """
     beside = _of_lines(spectrum, lines)
     kind = FAMILIES[family]
@@ -81,9 +85,12 @@ def refine(
     lines: tuple[SpectralLine, ...],
     beside: np.ndarray | None = None,
 ) -> MotionFit:
-    """Least risk from a start, of the parameters of family and lines together; family "": of the lines alone.
+    """Go down from one start to the least risk, with the parameters of a model and of the lines together.
 
-    beside : S [F], of the rest of the motion, which stays as it is
+    spectrum : of the fused rate, in bands;  family : name in FAMILIES; "": the lines alone
+    start    : [parameters of the family], where the search begins;  lines : where theirs begins
+    beside   : [F], deg²/s, density of another part of the motion that stays as it is; None: there is none
+    returns  : MotionFit, whose signal contains `beside`
     """
     kind = FAMILIES.get(family)
     names = kind.names if kind else ()
@@ -160,7 +167,7 @@ def _price(spectrum: RateSpectrum, names: tuple[str, ...], lines: int) -> float:
 
 
 def line_price(spectrum: RateSpectrum) -> float:
-    """Of three parameters. The frequency costs 2·ln(frequencies) more, as it is the best of so many."""
+    """What a line costs, in units of risk: three parameters, and 2·ln(frequencies), as it is the best of so many."""
     return len(LINE) * PRICE + 2.0 * math.log(max(0.5 * float(spectrum.weight.sum()), 1.0))
 
 
