@@ -6,6 +6,8 @@
 
 from snakemake.utils import min_version
 
+from vgyro.config import DEFINITIONS
+
 min_version("9.0")
 
 
@@ -21,7 +23,7 @@ wildcard_constraints:
     dataset="|".join(DATASETS) or "none",
     recording="[A-Za-z0-9][A-Za-z0-9_-]*",
     axis="[A-Za-z0-9_]+",
-    definition="level|demeaned|difference|residual|moved",
+    definition="|".join((*DEFINITIONS, "moved")),
     chunk=r"\d+-of-\d+",
     paper="|".join(PAPERS),
 

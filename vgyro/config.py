@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
@@ -19,9 +19,9 @@ Switch = Literal["auto", "off"]
 
 PARTIAL = "partial"
 
-DEFINITIONS: tuple[Definition, ...] = ("level", "demeaned", "difference", "residual")
+DEFINITIONS: tuple[Definition, ...] = get_args(Definition)
 MODES: tuple[Mode, ...] = ("in_sample", "causal")
-MOTION_MODELS: tuple[MotionModel, ...] = ("random_walk", "acceleration", "jerk", "oscillator", "markov")
+MOTION_MODELS: tuple[MotionModel, ...] = get_args(MotionModel)
 MODELS: tuple[CorrelationModel, ...] = ("dcc", "ccc")
 
 

@@ -1,4 +1,4 @@
-"""Write config/config.yaml, docs/configuration.md and docs/file-formats.md from the code.
+"""Write config/config.yaml, docs/architecture.md, docs/configuration.md and docs/file-formats.md from the code.
 
 `python -m vgyro.cli.documents`, in the top folder. It overwrites them: keep a config.yaml of your
 own elsewhere first.
@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vgyro.cli.architecture import architecture
 from vgyro.cli.formats_guide import file_formats
 from vgyro.describe import config_yaml, configuration_guide
 from vgyro.storage.tables import write_text
 
 DOCUMENTS = {
     "config/config.yaml": config_yaml,
+    "docs/architecture.md": architecture,
     "docs/configuration.md": configuration_guide,
     "docs/file-formats.md": file_formats,
 }

@@ -26,9 +26,11 @@ Moments = Iterator[tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class MomentBlocks:
-    """Blocks of `size` samples of the rates [T, N] in the gap-free stretches; a remainder is of the last block.
+    """The rates in blocks of `size` samples, none of which reaches over a gap.
 
-    first [M], first sample of each block; used [M], whether it counts; block [T], block of each sample, -1: of none
+    rate  : [T, N], deg/s;  size : samples of a block; what is left at the end of a stretch counts as its last block's
+    first : [M], first sample of each block;  used : [M] of bool, the block counts in the moments
+    block : [T], number of the block of each sample; -1 for a sample in no block
     """
 
     rate: np.ndarray
@@ -92,10 +94,13 @@ class Decay:
         return cls(keep, engines.get(parameters.engine).kalman.low_pass)
 
     def sums(self, blocks: MomentBlocks, part: slice, start: np.ndarray, back: bool = False) -> np.ndarray:
-        """[N + 1, B + 1]: column k is Σ keep^age·square of each gyro, and Σ keep^age in the last row, of all blocks
-        before block k of the part, the nearest at age 0; with `back`, of block k and all after it.
+        """Exponentially weighted sums over the blocks before each block, or from it on.
 
-        start [N + 1] : the sums of what lies outside of the part
+        blocks : the rates in blocks;  part : B of the blocks, in order
+        start  : [N + 1], the sums over what lies on the far side of the part, carried in
+        back   : False sums the blocks before block k, the nearest at age 0; True sums block k and all after it
+        returns : [N + 1, B + 1]. Column k holds, for each of the N gyros, the sum of keep^age times the squares of the
+                  block means, (deg/s)², and in the last row the sum of keep^age itself
         """
         values = np.vstack([blocks.squares(part), blocks.used[part]])
         rows = values[:, ::-1] if back else values

@@ -39,10 +39,15 @@ BROAD = 100.0
 
 @dataclass(frozen=True)
 class Choice:
-    """The walk, the blocks filtered with it, and whether the biases follow the temperature.
+    """The model of the biases that the likelihood prefers, and the filter's pass with it.
 
-    slopes : temperature slopes are among the constants
-    slopes_gain : 2Δ log likelihood of them; NaN without temperature;  needed : what it must exceed
+    walk        : the random walks
+    information : the measurements as they were filtered, with the slopes among the regressors or without
+    filtered    : the forward pass with `walk`
+    slopes      : the biases follow the regressor (a temperature, or a course in time): their slopes are among the
+                  constants
+    slopes_gain : 2Δ log likelihood of the slopes over the walks alone; NaN where there is no regressor
+    needed      : what slopes_gain has to exceed for the slopes to be kept
     """
 
     walk: Walk
@@ -92,9 +97,13 @@ def quick_gains(
     rrw: np.ndarray,
     arw: np.ndarray,
 ) -> list[float]:
-    """2Δ log likelihood of each of `others`, which have slopes, over `plain` with `walk`, before walks are chosen.
+    """What several models with slopes gain over the walks alone, before walks of their own are chosen.
 
-    Their K are as given, or those of `walk` where unknown, times one of QUICK.
+    plain  : the block means without slopes;  walk : the random walks that were chosen for them
+    others : the same means, each with one regressor for the slopes
+    rrw    : [N], deg/s/√s, K as measured, NaN if unknown;  arw : [N], deg/s/√Hz, about
+    returns : for each of `others` 2Δ log likelihood over `plain` with `walk`. Its walks are those that were measured,
+              or `walk` for a gyro without, all times the best number of QUICK
     """
     search = _Search.of(plain, blocks, rrw, arw)
     base = search.values(search.information.first_regressors(plain.plain), [walk])[0]

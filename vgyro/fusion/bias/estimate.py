@@ -7,7 +7,6 @@ vgyro.fusion.bias.model.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -112,7 +111,7 @@ def slow_errors(
         constants = with_shared_slope(evidence, choice.walk, so_far, constants)
     bias, covariance = _with_constants(state, covariance, constants, evidence.design)
     bias, covariance = _with_common(found, blocks, bias, covariance)
-    temperature = _slopes(found, constants) if choice.slopes and math.isnan(found.settles_s) else None
+    temperature = _slopes(found, constants) if choice.slopes and found.course is None else None
     notes = (
         why, found.note, _of_walk(array, choice.walk), common_note(found.common), _of_followed(found, constant_rate)
     )  # fmt: skip
@@ -194,8 +193,8 @@ def _of_followed(found: Followed, constant_rate: bool) -> str:
     if found.known is not None:
         return "the temperature coefficients are those of the record at rest, and what the differences say of them"
     compared = f"2Δ log L = {choice.slopes_gain:.1f}, {choice.needed:.1f} needed"
-    if math.isfinite(found.settles_s):
-        return f"the biases settle, as in a warm-up, in about {found.settles_s:.3g} s ({compared})"
+    if found.course is not None:
+        return f"the biases {found.course.words} {found.tau_s:.3g} s ({compared})"
     if not choice.slopes:
         return f"not regressed on the temperature ({compared})"
     seen = "their common part is not"

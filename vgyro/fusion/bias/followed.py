@@ -1,11 +1,13 @@
-"""What the biases follow beside their random walks: the temperature, or a warm-up that settles.
+"""What the biases follow beside their random walks: the temperature, or a course in time (COURSES) such as a warm-up.
 
-Both are regressors with one coefficient a gyro, chosen with the walks by the likelihood (vgyro.fusion.bias.choice).
+Both are regressors with one coefficient for each gyro, chosen with the walks by the likelihood
+(vgyro.fusion.bias.choice).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +24,7 @@ LEAST_RANGE = 1.0
 FEWEST = 60
 """Blocks from which a warm-up is looked for."""
 SETTLED = (3.0, 6.0, 12.0)
-"""A warm-up settles with the time constant of the recording over one of these."""
+"""A course has the time constant of the recording over one of these."""
 PROMISING = 3.0
 """Units of ln(blocks) by which 2Δ log likelihood may be below that of the walks alone, before its own are chosen."""
 DRIFTING = 4.0
@@ -30,13 +32,34 @@ DRIFTING = 4.0
 
 
 @dataclass(frozen=True)
-class Followed:
-    """The model of the biases.
+class Course:
+    """A course in time that the biases may follow, each gyro's by a factor of its own.
 
-    regressor : [B], K or 1, what the slopes are multiplied by; None: nothing was looked for
-    reference : temperature at which it is zero, °C;  settles_s : time constant of a warm-up, s; NaN: it is none
-    known     : what a record at rest knows of the slopes, where it is used;  common : variance of a walk all share
-    note      : what was not looked for, or not believed
+    words : what the page says of the biases, such as "settle, as in a warm-up, in about"; the time constant comes after
+    shape : (time since the first block [B] in s, time constant in s) → regressor [B], of the size of 1
+    """
+
+    words: str
+    shape: Callable[[np.ndarray, float], np.ndarray]
+
+
+COURSES = (Course("settle, as in a warm-up, in about", lambda since, tau: np.exp(-since / tau)),)
+"""What is looked for where no temperature is known; the likeliest is taken."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The model of the biases of one recording, chosen by the likelihood.
+
+    evidence  : the block means with the regressor;  choice : the walks, and whether the slopes were believed
+    common    : (deg/s)²/s, covariance rate of a random walk that all gyros share; 0: none is seen
+    regressor : [B], what the slopes are multiplied by: temperature less `reference` in K, or a course in time of the
+                size of 1; None: nothing was looked for
+    reference : °C, temperature at which the regressor is zero
+    known     : slopes from a record at rest, where they are used; None: they are not
+    course    : the course in time that the regressor is; None: it is a temperature, or nothing
+    tau_s     : time constant of the course, s; NaN without one
+    note      : what was not looked for, or not believed, and why
     """
 
     evidence: BiasEvidence
@@ -45,16 +68,19 @@ class Followed:
     regressor: np.ndarray | None = None
     reference: float = 0.0
     known: TemperatureAtRest | None = None
-    settles_s: float = math.nan
+    course: Course | None = None
+    tau_s: float = math.nan
     note: str = ""
 
 
 @dataclass(frozen=True)
 class BiasCase:
-    """One recording.
+    """One recording of N gyros in B blocks, for which a model of the biases is to be chosen.
 
-    variance : [B, N] of a sample;  correlation : [N, N] of the noise;  resting : [B], blocks at rest for certain
-    arw      : [N], about;  walk : the random walks; None: they are chosen
+    variance    : [B, N], (deg/s)², variance of the white noise of a sample;  correlation : [N, N] of that noise
+    resting     : [B] of bool, the board stands still in the whole block for certain
+    arw         : [N], deg/s/√Hz, white noise of each gyro in most blocks
+    walk        : the random walks; None: they are chosen
     """
 
     array: ArrayRates
@@ -73,7 +99,7 @@ class BiasCase:
         if self.array.temperature is not None and off:
             degrees, why_not = None, "temperature is off"
         if degrees is None:
-            return self._or_warm_up(self._fit(None, note=why_not))
+            return self._or_course(self._fit(None, note=why_not))
         centre = float(np.average(degrees, weights=self.blocks.length))
         known = None if self.array.at_rest.all() else self.array.noise.temperature
         if known is not None:
@@ -88,7 +114,8 @@ class BiasCase:
         regressor: np.ndarray | None,
         reference: float = 0.0,
         known: TemperatureAtRest | None = None,
-        settles_s: float = math.nan,
+        course: Course | None = None,
+        tau_s: float = math.nan,
         note: str = "",
     ) -> Followed:
         noise = self.array.noise
@@ -96,15 +123,15 @@ class BiasCase:
         common = common_walk(scales) if self.parameters.has("slow_common") else 0.0
         evidence = self._evidence(regressor, common, known)
         choice = choose(evidence, self.blocks, noise.rrw, self.arw, self.walk)
-        return Followed(evidence, choice, common, regressor, reference, known, settles_s, note)
+        return Followed(evidence, choice, common, regressor, reference, known, course, tau_s, note)
 
     def _evidence(self, regressor: np.ndarray | None, common: float, known: TemperatureAtRest | None) -> BiasEvidence:
         return BiasEvidence.of(
             self.array, self.blocks, self.variance, self.correlation, self.resting, regressor, common, known
         )
 
-    def _or_warm_up(self, plain: Followed) -> Followed:
-        """The likeliest warm-up where the walks alone are far from those of the record, and it is likelier than they.
+    def _or_course(self, plain: Followed) -> Followed:
+        """The likeliest course where the walks alone are far from those of the record, and it is likelier than they.
 
         It costs its time constant beside the coefficients' variance: ln(blocks) each (BIC).
         """
@@ -114,14 +141,14 @@ class BiasCase:
         if self.walk is not None or short or steady or not self.parameters.has("warm_up"):
             return plain
         since = self.blocks.time - self.blocks.time[0]
-        times = [float(since[-1]) / part for part in SETTLED]
-        others = [self._evidence(np.exp(-since / tau), plain.common, None) for tau in times]
+        courses = [(course, float(since[-1]) / part) for course in COURSES for part in SETTLED]
+        others = [self._evidence(course.shape(since, tau), plain.common, None) for course, tau in courses]
         walk, rrw = plain.choice.walk, self.array.noise.rrw
         gains = quick_gains(plain.evidence, walk, others, self.blocks, rrw, self.arw)
         if max(gains) < -PROMISING * price:
             return plain
-        tau = times[int(np.argmax(gains))]
-        found = self._fit(np.exp(-since / tau), settles_s=tau)
+        course, tau = courses[int(np.argmax(gains))]
+        found = self._fit(course.shape(since, tau), course=course, tau_s=tau)
         likelier = found.choice.slopes and found.choice.slopes_gain > found.choice.needed + price
         return found if likelier else plain
 

@@ -27,12 +27,13 @@ WIDE = 100.0
 
 @dataclass(frozen=True)
 class Walk:
-    """Random walks of the biases.
+    """The random walks of the biases of N gyros, and how they were chosen.
 
-    rrw : K [N], deg/s/√s
-    tau_s : time in which they fade, s: Gauss-Markov processes of the s.d. K·√(τ/2) about a constant; infinite: never
-    gain : 2Δ log likelihood of them over those given, less what other ratios cost
-    how  : as given; all of one size or multiplied by one number; each by its own
+    rrw   : [N], deg/s/√s, rate random walk K of each gyro
+    tau_s : time constant in s with which the walks fade. A walk that fades is a Gauss-Markov process about a constant,
+            of the standard deviation K·√(tau_s/2); infinite: the walks never fade
+    gain  : 2Δ log likelihood of these walks over those that were given, less what it costs that their ratios differ
+    how   : "given" as they were; "together": all of one size, or all multiplied by one number; "each": each by its own
     """
 
     rrw: np.ndarray
@@ -48,16 +49,21 @@ class Walk:
 
 @dataclass(frozen=True)
 class BiasEvidence:
-    """Block means of N gyros and what they weigh.
+    """Means of N gyros over B blocks of samples, how much they weigh, and which constants explain them.
 
-    means  : [B, N], deg/s, less `shared` [B], their mean where the board may move
-    weight : G [B, N, N];  total : R⁻¹1 [B, N];  time : [B] s
-    design : D [B, N, k] of the constants: the N biases, E steps after faults, and the N temperature slopes if any
-    steps  : variances beforehand of the steps, (deg/s)²
-    walks  : correlation [N, N] of the random walks;  common : variance of a walk that all share, (deg/s)²/s
-    anchored : standstill makes the common part seen in some of the blocks
-    known_slopes : the temperature slopes are √Γ·z, with independent normal z of variance 1 beforehand, Γ being the
-        covariance that a record at rest left of them; its slopes are taken off
+    means    : [B, N], deg/s, block means of the gyros, less `shared`
+    shared   : [B], deg/s, mean of the gyros in the blocks in which the board may move, 0 in the others
+    weight   : [B, N, N], s²/deg², weight matrix G of each block (see the head of this module)
+    total    : [B, N], s²/deg², row sums R⁻¹·1 of the inverse noise covariance of each block
+    time     : [B], s, middle of each block
+    design   : [B, N, k], regressors D of the k constants: N biases, E steps after faults and, where the biases may
+               follow a temperature or another course, N slopes
+    steps    : [E], (deg/s)², variance of each step beforehand
+    walks    : [N, N], correlation of the gyros' random walks
+    anchored : the board stands still in some blocks, so that the mean of all biases is seen there
+    common   : (deg/s)²/s, covariance rate of a walk that all gyros share; 0: there is none
+    known_slopes : a record at rest knows the slopes: its values are taken off the means, and what stands in `design`
+               are corrections √Γ·z, with Γ [N, N] the covariance that it left and z normal of variance 1 beforehand
     """
 
     means: np.ndarray
@@ -130,7 +136,7 @@ class BiasEvidence:
 
     @property
     def plain(self) -> int:
-        """Constants without the temperature slopes."""
+        """Number of constants that are no slopes: N biases and E steps."""
         return self.gyros + len(self.steps)
 
     @property
@@ -151,7 +157,7 @@ class BiasEvidence:
         return replace(self, **chosen)
 
     def information(self) -> Information:
-        """For the filter."""
+        """The block means and the regressors of the k constants as measurements for the filter."""
         columns = np.concatenate([self.means[..., None], self.design], axis=2)
         vector = self.weight @ columns
         total = np.tensordot(columns, vector, axes=([0, 1], [0, 1]))
@@ -283,11 +289,14 @@ def log_likelihood_slope(
 
 
 def with_shared_slope(evidence: BiasEvidence, walk: Walk, bias: np.ndarray, constants: Constants) -> Constants:
-    """The constants with what a rate that is one constant throughout says of the temperature slope that all share.
+    """Add what a rate that is constant throughout says of the temperature slope that all gyros share.
 
-    bias : b̂ [B, N] so far. What is left of the rate, z = u'(y - b̂) with u = R⁻¹1/(1'R⁻¹1), is regressed on a constant
-    and on the temperature, with the white noise of z and a walk of the variance u'Qu, which is that of alike gyros; its
-    slope is one more measurement of u'γ.
+    bias      : [B, N], deg/s, the biases b̂ as estimated so far
+    constants : posterior of the constants, whose last N are the slopes, deg/s/K
+    returns   : the posterior with one more measurement, that of u'γ, γ being the slopes and u the gyros' mean shares;
+                no difference between gyros shows it
+    The measurement: z = u'(y - b̂) with u = R⁻¹1/(1'R⁻¹1) is what is left of the rate. It is regressed on a constant
+    and on the temperature, with its white noise and a random walk of the variance u'Qu, as for gyros that are alike.
     """
     D = evidence.total.sum(axis=1)
     u = evidence.total / np.where(D > 0, D, 1.0)[:, None]

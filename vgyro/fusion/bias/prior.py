@@ -34,10 +34,13 @@ WIDE = 100.0
 
 @dataclass(frozen=True)
 class Prior:
-    """A mixture of M priors of the k constants: sums of p independent normal variables of mean 0.
+    """What is believed of the k constants before the blocks are seen: a mixture of M normal priors.
 
-    share [M], Σ = 1, posterior;  variance [M, p], of the variables
-    sums [k, p] : the constants are sums @ variables: what is each one's own, then the centres that some share
+    In each of them the constants are sums of p independent normal variables of mean 0: one of its own for each
+    constant, and centres that several constants share.
+    share    : [M], posterior weight of each prior; they add up to 1
+    variance : [M, p], (deg/s)² for biases and steps, (deg/s/K)² for slopes, variance of the variables
+    sums     : [k, p], which variables each constant is the sum of: constants = sums @ variables
     """
 
     share: np.ndarray
@@ -58,13 +61,16 @@ class Prior:
 
 
 def empirical_prior(evidence: BiasEvidence, filtered: Filtered) -> Prior:
-    """The mixture over s and over which gyros are far off, each weighed by the likelihood of the blocks.
+    """The prior of the constants that the recording itself suggests: a mixture over how far the biases scatter.
 
-    far off : a normal variable of the variance of the gyro's own square, which costs FAR_OFF
-    The posterior of s under 1/s makes the variance of the centre such that error²/variance is 1 on average: that of the
-    mean of N normal variables, times (N - 1)/(N - 3). Temperature slopes that no record at rest knows: one
-    variance, its posterior mean likewise.
-    Gelman et al. (2013), Bayesian Data Analysis, ch. 5 (hierarchical normal model).
+    evidence : the block means;  filtered : the forward pass with the walks that were chosen
+    returns  : Prior, each part weighed by the likelihood of the blocks. The parts differ in the standard deviation s of
+               the biases about their centre, with the density 1/s beforehand, and in which gyros are far off. A gyro
+               that is far off has a variance of its own, the square of what it is seen to be off by, and costs
+               log(FAR_OFF)
+    The density 1/s makes the variance of the centre that of the mean of N normal variables times (N - 1)/(N - 3), so
+    that error²/variance is 1 on average. Slopes that no record at rest knows have one variance, its posterior mean
+    likewise. Gelman et al. (2013), Bayesian Data Analysis, ch. 5 (hierarchical normal model).
     """
     gyros, many = evidence.gyros, len(filtered.squares) - 1
     groups = [slice(0, gyros)]

@@ -16,11 +16,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Information:
-    """What the measurements of B blocks say of N states.
+    """What the measurements of B blocks of samples say of N states, the biases of the gyros in deg/s.
 
-    matrix : G [B, N, N], inverse covariance of each block's measurement
-    vector : G·y [B, N, 1 + k], of the measurement and of the k regressors
-    total  : Σ y'Gy [1 + k, 1 + k];  gap : [B] s, time since the block before, 0 for the first
+    matrix : [B, N, N], s²/deg², the weight matrix G of each block: the inverse covariance of its measurement, singular
+             where the block does not see a part of the state
+    vector : [B, N, 1 + k], G·y for each column of y: first the measurement in deg/s, then the k regressors
+    total  : [1 + k, 1 + k], the sum over the blocks of y'·G·y
+    gap    : [B], s, time since the block before; 0 for the first block
     """
 
     matrix: np.ndarray
@@ -29,7 +31,10 @@ class Information:
     gap: np.ndarray
 
     def merged(self, first: np.ndarray) -> Information:
-        """Several blocks as one, as if the states stood still within; first [M], first block of each."""
+        """The same measurements with several blocks taken as one, as if the states did not change within it.
+
+        first : [M], increasing, number of the first block of each of the M new ones;  returns : Information of M blocks
+        """
         time = np.cumsum(self.gap)
         middle = np.add.reduceat(time, first) / np.diff(first, append=len(time))
         matrix, vector = (np.add.reduceat(one, first, axis=0) for one in (self.matrix, self.vector))
@@ -43,11 +48,17 @@ class Information:
 
 @dataclass(frozen=True)
 class Filtered:
-    """One-sided estimates, before each block's own measurement.
+    """What the forward filter knows of the N states at each of B blocks, before the measurement of that block is used.
 
-    state : [B, N, 1 + k], of each column;  covariance : P [B, N, N];  keep : L = (I + P·G)⁻¹ [B, N, N]
-    fade  : φ [B];  grown : q [B], that of the first block what the state begins with
-    squares : Σ e'We [1 + k, 1 + k] of the innovations e;  log_det : Σ log det(I + P·G)
+    state      : [B, N, 1 + k], predicted state for the measurement (deg/s) and for each of the k regressors
+    covariance : [B, N, N], (deg/s)², covariance P of the prediction
+    keep       : [B, N, N], L = (I + P·G)⁻¹, the part of the prediction that is left when the measurement is used
+    fade       : [B], factor φ by which the state decays from the block before to this one; 1 where walks do not fade
+    grown      : [B], s, factor q of the walk's covariance rate: q·walk [(deg/s)²] is added from the block before to
+                 this one; for the first block q·walk is the covariance with which the state begins
+    squares    : [1 + k, 1 + k], the sum over the blocks of e'·W·e, where e are the innovations of all columns and W is
+                 their inverse covariance
+    log_det    : the sum over the blocks of log det(I + P·G)
     """
 
     state: np.ndarray

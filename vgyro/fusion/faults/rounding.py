@@ -14,9 +14,11 @@ COARSE = 0.25
 
 @dataclass(frozen=True)
 class Rounding:
-    """lasting : [N] (deg/s)², of the part of the error that stays while the rate does
-    toggles : [N] (deg/s)², by how much a sample's variance may be above the usual one: coarse values are constant in
-              some blocks, and go to and fro between two in others
+    """What the steps of the values of N gyros add to the means and variances of blocks.
+
+    lasting : [N], (deg/s)², variance of the part of the rounding error that stays the same as long as the rate does
+    toggles : [N], (deg/s)², by how much the variance of a sample in one block may exceed the usual one: coarse values
+              are constant in some blocks, and go to and fro between two of them in others; 0 where the steps are fine
     """
 
     lasting: np.ndarray
@@ -24,7 +26,11 @@ class Rounding:
 
 
 def rounding_of(step: np.ndarray, variance: np.ndarray) -> Rounding:
-    """step [N] deg/s, 0: none is seen;  variance [N] : of a sample, as rounded, (deg/s)²"""
+    """The effect of rounding on the block means and variances of N gyros.
+
+    step     : [N], deg/s, distance of neighbouring values of each gyro; 0 where no steps are seen
+    variance : [N], (deg/s)², usual variance of a sample, rounding included
+    """
     pairs = zip(step.tolist(), variance.tolist(), strict=True)
     lasting = np.array([lasting_variance(q, noise_before(q, seen)) if q > 0 else 0.0 for q, seen in pairs])
     coarse = (step > 0) & (least_variance(step) > COARSE * variance)

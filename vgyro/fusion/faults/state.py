@@ -41,11 +41,18 @@ NOISE_KINDS = ("noise", "burst")
 
 @dataclass
 class State:
-    """What is known so far of the faults of one recording.
+    """What is known so far of the faults of one recording of N gyros in B blocks; the search adds to it.
 
-    sums : of the blocks;  block_s : their length, s;  temperature [B] °C, None: not known;  still [B] : only these are
-    judged, and each stretch of them is a run of its own, None: all are;  step [N] deg/s, of the values, 0: none
-    deaf : gyros that show nothing of the motion in all of the recording;  silenced : those that stop to show it
+    sums        : the block means and their second moments;  block_s : length of a block, s
+    options     : the user's thresholds
+    temperature : [B], °C; None: not known
+    still       : [B] of bool, only these blocks are judged, and biases may change between stretches of them; None: all
+                  are
+    step        : [N], deg/s, distance of neighbouring values of each gyro, 0 where no steps are seen; None: nowhere
+    taken       : the faults that were found
+    silenced    : gyros that stop to show the motion, from then on
+    Made from these: `deaf`, gyros that show nothing of the motion in the whole recording; `sigma2` [N], (deg/s)², the
+    usual variance of a sample; `gain` [B, N], how much of the motion a gyro shows; `judged` [B]; `run` [B]; `rounding`.
     """
 
     sums: BlockSums

@@ -42,7 +42,11 @@ MAD = 1.4826
 
 @dataclass(frozen=True)
 class RateSamples:
-    """Some samples of N gyros: values [N, n], deg/s;  used [N, n];  borders : places at which a new stretch begins"""
+    """Samples of N gyros that are looked at together, perhaps from several gap-free stretches one after the other.
+
+    values  : [N, n], deg/s;  used : [N, n] of bool, the sample counts
+    borders : places among the n samples at which a new stretch begins
+    """
 
     values: np.ndarray
     used: np.ndarray
@@ -51,10 +55,13 @@ class RateSamples:
 
 @dataclass(frozen=True)
 class RateSetting:
-    """How a recording is looked at.
+    """What is assumed of the gyros of a recording while the rate is looked for that samples far off cannot move.
 
-    densities [N] : of each gyro's x;  usual [N] : size of its noise, deg/s;  offset [N] : from the others, deg/s
-    centre, size  : windows, samples;  reach : of the neighbours, samples; 0: the gyros alone
+    densities : [N], density of each gyro's noise x, in units of its size
+    usual     : [N], deg/s, size of each gyro's noise in most of the recording
+    offset    : [N], deg/s, what each gyro is off from the others by in most of the recording
+    centre    : samples of the window over which an offset is followed;  size : of the window for the size of the noise
+    reach     : samples on either side from which a sample is predicted; 0: the rate is from the gyros alone
     """
 
     densities: Sequence[ScaleMixture]
@@ -67,11 +74,13 @@ class RateSetting:
 
 @dataclass(frozen=True)
 class Local:
-    """What is known of some samples [n] of N gyros.
+    """The rate, and what each of N gyros is off from it by, at n samples.
 
-    rate, variance : ŵ and v [n], the neighbours included, deg/s and (deg/s)²
-    alone, own     : mean and variance [n] from the gyros' own samples; infinite where none is used
-    size, residual : s and y - m - ŵ [N, n], deg/s;  centre : m [N, n], deg/s
+    rate     : [n], deg/s, mean ŵ of the rate given gyros and neighbours in time;  variance : [n], (deg/s)², v of it
+    alone    : [n], deg/s, mean from the gyros' own samples;  own : [n], (deg/s)², its variance; infinite where no gyro
+               is used
+    size     : [N, n], deg/s, size s of each gyro's noise near the sample
+    residual : [N, n], deg/s, y - m - ŵ;  centre : [N, n], deg/s, the offset m
     """
 
     rate: np.ndarray
@@ -173,7 +182,12 @@ def _of_gyro(
 
 
 def mean_log_variance(look: RateSamples, local: Local, setting: RateSetting, reach: int) -> float:
-    """Of what `reach` neighbours predict, over that of the gyros; NaN: there are too few samples."""
+    """How well the neighbours in time predict a sample: the mean logarithm of the variance of their prediction.
+
+    reach   : samples on either side from which a parabola predicts
+    returns : mean of log(variance of the prediction / variance of the gyros' own combination), below 0 where the
+              neighbours are the better witness; NaN where there are too few samples
+    """
     if len(local.alone) <= 2 * reach:
         return float("nan")
     extra = _extra(_predicted(local.alone, local.own, reach) - local.alone, local.own, setting.size)

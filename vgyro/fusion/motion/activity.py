@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from vgyro.fusion.motion.models import NARROW, UNLIMITED, Activity, Motion
+from vgyro.fusion.motion.search import FAMILIES
 from vgyro.fusion.motion.smoother import smooth, stretches
 
 BLOCK_S, LEAST_BLOCK = 0.25, 8
@@ -24,8 +25,6 @@ FIRST, MOST = 1, 6
 """Levels on either side that are looked at first, and at most."""
 FAR = 6.0
 """A square counts no more, over the variance: one sample far off is no motion."""
-ORDER = {"random_walk": 1, "markov": 1, "acceleration": 2, "oscillator": 2, "jerk": 3}
-"""The bandwidth of the smoother goes with the 2·order-th root of the process noise."""
 
 
 def find_activity(
@@ -56,7 +55,7 @@ def find_activity(
         return _errors(z, r, phi, found.rate, found.variance, counts, begins)
 
     cost = 2.0 * math.log(max(int(counts.sum()), 2))
-    order = ORDER[motion.model]
+    order = next(family.order for family in FAMILIES.values() if family.model == motion.model)
     known = {level: errors(Activity.even(len(z), STEP**level, order)) for level in range(-FIRST, FIRST + 1)}
     path = _path(known, cost, apart)
     while more := _beyond(known, path):

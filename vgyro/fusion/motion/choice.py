@@ -43,10 +43,13 @@ CHECKED = 1 << 14
 
 @dataclass(frozen=True)
 class ComparedModels:
-    """Models compared on the pieces of a recording without the sinusoids that were taken out of them.
+    """Models of the rate that were fitted to one recording, beside the sinusoids that were found first.
 
-    bands : of the spectrum, on which the fits were made
-    fits  : in order of their cost;  spent : cost of the sinusoids
+    pieces    : the stretches of the recording, from which the sinusoids have been taken
+    sinusoids : the lines without a width that were taken
+    bands     : the spectrum of the pieces in bands, which the models were fitted to
+    fits      : the models, that of the least cost first
+    spent     : cost of the sinusoids, in the units of MotionFit.cost
     """
 
     pieces: list[SpectrumPiece]
@@ -140,10 +143,12 @@ def _best(
 
 @dataclass(frozen=True)
 class FoundLines:
-    """Lines of a recording.
+    """What the search for narrow lines has found so far in one recording.
 
-    pieces, whole : without the sinusoids, and all lines of their spectrum, without the bands `foreign`
-    sinusoids, lines : of the motion, without and with a width;  foreign : bands of lines that are none, Hz
+    pieces    : the stretches of the recording, from which the sinusoids have been taken
+    whole     : all lines of their periodograms, without the bands `foreign`
+    sinusoids : lines of the motion that have no width;  lines : lines of the motion that have one
+    foreign   : bands (from, to) in Hz that stand out and are no motion, because the gyros do not share them
     """
 
     pieces: list[SpectrumPiece]
@@ -183,10 +188,11 @@ def _lines(
 
 @dataclass(frozen=True)
 class AtRest:
-    """What a recording at rest has beside the fixed bandwidth of its smoother.
+    """What a board at rest does that its smoother, a low-pass of a fixed bandwidth, would take away.
 
-    lines : vibrations, which are passed;  lost : variance of what else is seen of motion and is not passed, (deg/s)²
-    noise : part of the variance of the samples that is not the vibrations'
+    lines : vibrations, which the smoother is told to pass
+    lost  : (deg/s)², variance of any other motion that is seen for certain and is not passed
+    noise : the part of the variance of the samples that is noise and no vibration, above 0 and at most 1
     """
 
     lines: tuple[SpectralLine, ...] = ()

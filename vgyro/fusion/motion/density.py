@@ -11,22 +11,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.fusion.motion.models import SpectralLine
+from vgyro.fusion.motion.evidence import RateSpectrum
+from vgyro.fusion.motion.models import Dynamics, SpectralLine
 
 Values = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class DensityFamily:
-    """Models of one kind.
+class MotionFamily:
+    """A model of the rate, and how its parameters are searched for: an entry of vgyro.fusion.motion.search.FAMILIES.
 
-    model   : as Motion.model;  names : of the parameters
-    density : (values [G, 1] by name, frequency [F] Hz, rate_hz) → [G, F]
+    model    : as Motion.model
+    names    : of the parameters, all above zero; vgyro.fusion.motion.search.bounds_of has the range of each name
+    dynamics : (a keyword for each parameter, period in s) → Dynamics of the sampled rate
+    density  : (values [G, 1] by name, frequency [F] in Hz, rate_hz) → [G, F], two-sided density of the sampled rate,
+               deg²/s
+    starts   : (spectrum of the fused rate, frequency in Hz at which rate and noise are alike, about) → [G, parameters],
+               sets of parameters from which the search starts
+    order    : the bandwidth of the model's smoother goes with the 2·order-th root of its process noise
     """
 
     model: str
     names: tuple[str, ...]
+    dynamics: Callable[..., Dynamics]
     density: Callable[[Values, np.ndarray, float], np.ndarray]
+    starts: Callable[[RateSpectrum, float], np.ndarray]
+    order: int
 
 
 def _images(one: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, rate_hz: float) -> np.ndarray:
@@ -34,18 +44,22 @@ def _images(one: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, rate
     return one(places[0]) + one(places[1]) + one(places[2])
 
 
-def _walk(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def walk(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Density of a random walk, of the parameter q in deg²/s³; arguments and result as MotionFamily.density."""
     return values["q"] / (2.0 * rate_hz * np.sin(math.pi * frequency / rate_hz)) ** 2
 
 
-def _driven(order: int) -> Callable[[Values, np.ndarray, float], np.ndarray]:
+def driven(order: int) -> Callable[[Values, np.ndarray, float], np.ndarray]:
+    """The density of a rate that is white noise integrated `order` times, 2 or more; q in deg²/s^(2·order + 1)."""
+
     def density(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
         return values["q"] * _images(lambda f: (2.0 * math.pi * f) ** (-2 * order), frequency, rate_hz)
 
     return density
 
 
-def _markov(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def markov(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Density of a first-order Markov rate, of tau_s in s and sd in deg/s; the rest as MotionFamily.density."""
     steps = 1.0 / (rate_hz * values["tau_s"])
     keep = np.exp(-steps)
     power = -np.expm1(-2.0 * steps) * values["sd"] ** 2 / rate_hz
@@ -57,17 +71,20 @@ def _section(own: np.ndarray, damping: np.ndarray, frequency: np.ndarray) -> np.
     return 1.0 / ((1.0 - square) ** 2 + 4.0 * damping**2 * square)
 
 
-def _resonance(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def resonance(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Density of one oscillation, of the parameters LINE: Hz, 1 and deg/s; the rest as MotionFamily.density."""
     own, damping = values["frequency_hz"], values["damping"]
     lowest = values["sd"] ** 2 * 4.0 * damping / (2.0 * math.pi * own)
     return lowest * _images(lambda f: _section(own, damping, f), frequency, rate_hz)
 
 
-def _oscillator(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
-    return _resonance(values, frequency, rate_hz) + _walk(values, frequency, rate_hz)
+def oscillator(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Density of an oscillation about a random walk, the sum of both; arguments as MotionFamily.density."""
+    return resonance(values, frequency, rate_hz) + walk(values, frequency, rate_hz)
 
 
-def _pair(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def pair(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Density of an oscillation that another one drives, of the parameters PAIR; the rest as MotionFamily.density."""
     own, damping, second, loss = (values[name] for name in PAIR[:-1])
     lowest = values["sd"] ** 2 / pair_power(own, damping, second, loss)
     return lowest * _images(lambda f: _section(own, damping, f) * _section(second, loss, f), frequency, rate_hz)
@@ -88,18 +105,9 @@ def pair_power(own: np.ndarray, damping: np.ndarray, second: np.ndarray, loss: n
 
 PAIR = ("frequency_hz", "damping", "second_hz", "second_damping", "sd")
 LINE = ("frequency_hz", "damping", "sd")
-FAMILIES = {
-    "random_walk": DensityFamily("random_walk", ("q",), _walk),
-    "acceleration": DensityFamily("acceleration", ("q",), _driven(2)),
-    "jerk": DensityFamily("jerk", ("q",), _driven(3)),
-    "markov": DensityFamily("markov", ("tau_s", "sd"), _markov),
-    "resonance": DensityFamily("oscillator", LINE, _resonance),
-    "oscillator": DensityFamily("oscillator", (*LINE, "q"), _oscillator),
-    "pair": DensityFamily("oscillator", PAIR, _pair),
-}
 
 
 def of_line(line: SpectralLine, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
     """Density [F] of a line."""
     values = {name: np.array(getattr(line, name)) for name in LINE}
-    return _resonance(values, frequency, rate_hz)
+    return resonance(values, frequency, rate_hz)

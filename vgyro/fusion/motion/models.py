@@ -7,7 +7,7 @@ form, from dx = A·x·dt + G·dβ: F = e^(A·T) and Q = q·∫ e^(A·s) G G' e^(
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -45,10 +45,11 @@ class SpectralLine:
 
 @dataclass(frozen=True)
 class MotionCandidate:
-    """How well a model smooths.
+    """One of the models that were compared, and how well it smooths the recording.
 
-    risk : squared error of the smoother, estimated, in units of the noise, summed
-    cost : risk + what the parameters cost
+    model, parameters, lines : as in Motion
+    risk : estimated squared error of its smoother, summed over the recording, in units of the variance of the noise
+    cost : risk plus what its parameters cost; the model of the least cost is taken
     """
 
     model: str
@@ -85,22 +86,23 @@ class Motion:
         if self.model == UNLIMITED:
             return "no smoothing"
         units = UNITS | {"q": Q_UNITS.get(self.model, "")}
-        values = ", ".join(f"{name} = {value:.4g}{units[name]}" for name, value in self.parameters.items())
+        values = ", ".join(f"{name} = {value:.4g}{units.get(name, '')}" for name, value in self.parameters.items())
         return " + ".join([f"{self.model}: {values}", *(line.text for line in self.lines)])
 
     def dynamics(self) -> Dynamics:
         found = dynamics(self.model, self.parameters, 1.0 / self.rate_hz)
         for line in self.lines:
-            found = found.beside(_resonator(line.frequency_hz, line.damping, line.sd, 1.0 / self.rate_hz))
+            found = found.beside(resonator(line.frequency_hz, line.damping, line.sd, 1.0 / self.rate_hz))
         return found
 
 
 @dataclass(frozen=True)
 class Activity:
-    """How lively the rate is, beside its model.
+    """How lively the rate is from time to time, beside what its model says.
 
-    level : [T] of uint8;  width : [M], what the bandwidth of the smoother is multiplied by at each level, about
-    order : the bandwidth goes with the 2·order-th root of the process noise
+    level : [T] of uint8, number of the level of each sample
+    width : [M], for each level the factor by which the bandwidth of the smoother changes, about; 1: as the model says
+    order : the bandwidth goes with the 2·order-th root of the process noise, which therefore changes by width^(2·order)
     """
 
     level: np.ndarray
@@ -128,10 +130,15 @@ class Activity:
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Of n states: transition F and process Q [n, n], reads h [n] (the rate is h'x).
+    """How the rate moves from one sample to the next: a linear model of n states, all in deg/s.
 
-    stationary : [n, n] covariance of the states that have one; NaN on its diagonal: of a state that wanders
-    order      : [n] which derivative of the rate the state is
+    transition : [n, n], F: the state at a sample is F times the one before, plus noise of the covariance `process`
+    process    : [n, n], (deg/s)², Q
+    reads      : [n], h: the rate is h'·state
+    stationary : [n, n], (deg/s)², covariance of the states that have one in the long run; NaN on the diagonal for a
+                 state that wanders without a limit
+    order      : [n], which derivative of the rate a state is: 0 for a part of the rate itself, 1 for its derivative
+                 times the sample period, and so on
     """
 
     transition: np.ndarray
@@ -158,41 +165,46 @@ def _blocks(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def dynamics(model: str, parameters: Mapping[str, float], period: float) -> Dynamics:
-    """Of a model with its parameters at a sample period T, s.
+    """How the rate moves from sample to sample, by a model of vgyro.fusion.motion.search.FAMILIES.
 
-    raises : DataError for a model that is not known
+    parameters : of the model, as Motion.parameters;  period : of the samples, s
+    raises     : DataError for a model that is not known, or other parameters than its own
     """
-    if model == "oscillator":
-        make = _pair if "second_hz" in parameters else _oscillator
-        return make(**parameters, period=period)
-    if model == "markov":
-        return _markov(**parameters, period=period)
-    if model not in _DRIVEN:
-        raise DataError(
-            f"unknown motion model {model!r}", remedy=f"Known: {', '.join([*_DRIVEN, 'oscillator, markov'])}"
-        )
-    shape = _DRIVEN[model]
-    states = len(shape)
-    lags = np.subtract.outer(np.arange(states), np.arange(states)).T
+    from vgyro.fusion.motion.search import FAMILIES  # The table is made of what is here.
+
+    kinds = [family for family in FAMILIES.values() if family.model == model]
+    for family in kinds:
+        if set(family.names) == set(parameters):
+            return family.dynamics(**parameters, period=period)
+    if not kinds:
+        known = dict.fromkeys(family.model for family in FAMILIES.values())
+        raise DataError(f"unknown motion model {model!r}", remedy=f"Known: {', '.join(known)}")
+    takes = ", or ".join(", ".join(family.names) for family in kinds)
+    raise DataError(f"the motion model {model} has the parameters {takes}", remedy=f"not {', '.join(parameters)}")
+
+
+_DRIVEN = (
+    np.ones((1, 1)),
+    np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]),
+    np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]]),
+)
+"""Of rates whose highest derivative is a random walk, of 1, 2 and 3 states: Q in units of q·T^(2n-1)."""
+
+
+def driven(order: int) -> Callable[..., Dynamics]:
+    """The dynamics of a rate that is white noise integrated `order` times, 1 to 3: states rate and derivatives."""
+    shape, each = _DRIVEN[order - 1], np.arange(order)
+    lags = np.subtract.outer(each, each).T
     F = np.array([[1.0 / math.factorial(lag) if lag >= 0 else 0.0 for lag in row] for row in lags.tolist()])
-    return Dynamics(
-        F,
-        parameters["q"] * period ** (2 * states - 1) * shape,
-        np.eye(states)[0],
-        np.diag(np.full(states, math.nan)),
-        np.arange(states),
-    )
+
+    def made(q: float, period: float) -> Dynamics:
+        Q = q * period ** (2 * order - 1) * shape
+        return Dynamics(F, Q, np.eye(order)[0], np.diag(np.full(order, math.nan)), each)
+
+    return made
 
 
-_DRIVEN = {
-    "random_walk": np.ones((1, 1)),
-    "acceleration": np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]),
-    "jerk": np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]]),
-}
-"""Models whose highest derivative is a random walk: Q in units of q·T^(2n-1)."""
-
-
-def _markov(tau_s: float, sd: float, period: float) -> Dynamics:
+def markov(tau_s: float, sd: float, period: float) -> Dynamics:
     """First order about a mean that does not move: states deviation and mean."""
     return Dynamics(
         np.diag([math.exp(-period / tau_s), 1.0]),
@@ -203,12 +215,12 @@ def _markov(tau_s: float, sd: float, period: float) -> Dynamics:
     )
 
 
-def _oscillator(frequency_hz: float, damping: float, sd: float, q: float, period: float) -> Dynamics:
+def oscillator(frequency_hz: float, damping: float, sd: float, q: float, period: float) -> Dynamics:
     """A resonator about a random walk: states level, x, x'·T."""
-    return dynamics("random_walk", {"q": q}, period).beside(_resonator(frequency_hz, damping, sd, period))
+    return driven(1)(q, period).beside(resonator(frequency_hz, damping, sd, period))
 
 
-def _resonator(frequency_hz: float, damping: float, sd: float, period: float) -> Dynamics:
+def resonator(frequency_hz: float, damping: float, sd: float, period: float) -> Dynamics:
     """x'' + 2ζω·x' + ω²·x = white noise, of stationary s.d. `sd`: states x, x'·T."""
     omega, scale = 2.0 * math.pi * frequency_hz, np.array([1.0, period])
     stationary = sd**2 * np.array([1.0, (omega * period) ** 2])
@@ -225,7 +237,7 @@ def _resonator(frequency_hz: float, damping: float, sd: float, period: float) ->
     return Dynamics(F, Q, np.array([1.0, 0.0]), np.diag(stationary), np.array([0, 1]))
 
 
-def _pair(
+def pair(
     frequency_hz: float, damping: float, second_hz: float, second_damping: float, sd: float, period: float
 ) -> Dynamics:
     """An oscillator driven by an oscillator, of stationary s.d. `sd` about zero: states x and three derivatives.

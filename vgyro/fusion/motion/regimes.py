@@ -16,10 +16,11 @@ JUMP = 5.0
 
 @dataclass(frozen=True)
 class Regimes:
-    """M ways from one sample to the next of n states.
+    """The dynamics of the rate where they change from sample to sample: M kinds of steps between the n states.
 
-    transition, process : F and Q [M, n, n];  of_step [T] of uint8 : which of them leads to each sample
-    calibration [K], of_sample [T] : what the variance of the smoothed rate is multiplied by at each sample
+    transition  : [M, n, n], F of each kind of step;  process : [M, n, n], (deg/s)², Q of each
+    of_step     : [T] of uint8, which kind of step leads to each sample
+    calibration : [K], factors for the variance of the smoothed rate;  of_sample : [T] of uint8, which of them holds
     """
 
     transition: np.ndarray
@@ -103,7 +104,7 @@ def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -
     F, Q = dynamics.transition.copy(), dynamics.process.copy()
     F[:states, :states], Q[:states, :states] = np.eye(states), 0.0
     Q[0, 0] = rest.parameters["q"] / rest.rate_hz
-    if motion.model in ("acceleration", "jerk", "oscillator"):
+    if dynamics.order[:states].any():
         F[1:states, :states] = 0.0
         F[0, :states] = dynamics.reads[:states]
         Q[1:states, 1:states] = np.diag(_known_derivatives(motion, dynamics, density)[1:states])
@@ -114,10 +115,10 @@ def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np
     """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
 
     With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero;
-    of two of them all that is known is how large the derivatives are.
+    of two of them, and of other models, all that is known is how large the derivatives are.
     """
     values = motion.parameters
-    if "second_hz" in values:
+    if "second_hz" in values or motion.model not in ("acceleration", "jerk", "oscillator"):
         return np.diagonal(dynamics.stationary)
     if motion.model == "oscillator":
         q = 4.0 * values["damping"] * (2.0 * math.pi * values["frequency_hz"]) ** 3 * values["sd"] ** 2

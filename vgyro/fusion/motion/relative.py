@@ -30,14 +30,14 @@ PRICE = 2.0
 
 @dataclass(frozen=True)
 class Relative:
-    """Answers of N gyros relative to their mean, of terms (scale, delay in s, curvature in s²).
+    """How N gyros answer to the motion relative to their mean: scale factor (1), delay (s) and curvature (s²).
 
-    value      : [N, 3], posterior means, of Σ = 0
-    covariance : [3, N, N] of value - truth about the mean of all, of one term each
-    spread     : [3] standard deviation of the gyros' true values, as the recording shows it; of the mean of all N,
-                 which is not seen, it is spread/√N
-    window     : samples of the smoother
-    gain       : the mean of all over the weighted mean that the motion is read from
+    value      : [N, 3], posterior means of the terms; over the gyros each adds up to 0
+    covariance : [3, N, N], for each term the covariance of the errors of `value`, about the mean of all
+    spread     : [3], standard deviation of the true terms among gyros of this kind, as the recording shows it. The
+                 error of the mean of all gyros is not seen; its standard deviation is spread/√N
+    window     : samples of the window over which the motion is smoothed, odd
+    gain       : scale of the plain mean of the gyros over that of the weighted mean that the motion is read from
     """
 
     value: np.ndarray
@@ -157,12 +157,14 @@ def _estimated(products: np.ndarray, sums: np.ndarray, usable: np.ndarray, windo
 
 
 def posterior(value: np.ndarray, error: np.ndarray, price: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Of N normal variables of mean 0 and one variance, of which differences were measured: hierarchical Bayes.
+    """Estimate N values, of which only the differences were measured, by shrinking them toward their mean.
 
-    value [N] : measured, all with one unknown number added;  error : [N, N] covariance of that
-    price   : 2Δ log likelihood that their spread must bring over none
-    returns : mean [N] and covariance [N, N] about the mean of all, and the spread of greatest likelihood; zeros without
-              any
+    The values are taken as normal variables with one unknown variance (hierarchical Bayes).
+    value   : [N], measured values, all with the same unknown number added;  error : [N, N], covariance of the
+              measurement
+    price   : 2Δ log likelihood by which a variance above zero must be better than none
+    returns : posterior mean [N] about the mean of all, its covariance [N, N], and the standard deviation of the
+              greatest likelihood; all zero where the differences are not worth their price
     """
     gyros = len(value)
     # Contrasts: orthonormal, each without the mean.

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vgyro.fusion.motion.density import FAMILIES, LINE, PAIR, DensityFamily, of_line, pair_power
+from vgyro.fusion.motion import density, models
+from vgyro.fusion.motion.density import LINE, PAIR, MotionFamily, of_line, pair_power
 from vgyro.fusion.motion.evidence import RateSpectrum
 from vgyro.fusion.motion.models import SpectralLine
 
@@ -33,9 +34,11 @@ WIDEST = 1.5
 
 @dataclass(frozen=True)
 class MotionFit:
-    """A family with its parameters, and the lines beside it that have a width.
+    """A model of the rate, and lines that have a width, fitted together to the spectrum of one recording.
 
-    signal : S [F];  risk : as estimated;  price : of the parameters
+    family : name in FAMILIES; "": a rate that does not move but for the lines;  values : its parameters by name
+    lines  : vibrations beside it;  signal : [F], deg²/s, two-sided density of all of it at the bands of the spectrum
+    risk   : estimated squared error of its smoother, in units of the variance of the noise;  price : of its parameters
     """
 
     family: str
@@ -57,14 +60,17 @@ def still(spectrum: RateSpectrum, lines: tuple[SpectralLine, ...] = ()) -> Motio
 
 
 def search(spectrum: RateSpectrum, family: str, lines: tuple[SpectralLine, ...], crossing: float) -> MotionFit:
-    """Least risk of a family beside the lines, whose parameters are then searched with it.
+    """Fit a model to a spectrum: try all its starts, go on from the KEPT best, and return the fit of the least cost.
 
-    crossing : frequency at which rate and noise are alike, about
+    spectrum : of the fused rate, in bands;  family : name in FAMILIES
+    lines    : vibrations beside the model, whose parameters are fitted with it
+    crossing : frequency in Hz at which rate and noise are alike, about, from which starts are made
     """
     beside = _of_lines(spectrum, lines)
-    grid = _GRIDS[family](spectrum, crossing)
-    signals = FAMILIES[family].density({name: grid[:, [k]] for k, name in enumerate(FAMILIES[family].names)},
-                                       spectrum.frequency, spectrum.rate_hz)  # fmt: skip
+    kind = FAMILIES[family]
+    grid = kind.starts(spectrum, crossing)
+    values = {name: grid[:, [place]] for place, name in enumerate(kind.names)}
+    signals = kind.density(values, spectrum.frequency, spectrum.rate_hz)
     risks = spectrum.risk(signals + beside)
     return min(
         (refine(spectrum, family, grid[place], lines) for place in np.argsort(risks)[:KEPT].tolist()),
@@ -79,14 +85,17 @@ def refine(
     lines: tuple[SpectralLine, ...],
     beside: np.ndarray | None = None,
 ) -> MotionFit:
-    """Least risk from a start, of the parameters of family and lines together; family "": of the lines alone.
+    """Go down from one start to the least risk, with the parameters of a model and of the lines together.
 
-    beside : S [F], of the rest of the motion, which stays as it is
+    spectrum : of the fused rate, in bands;  family : name in FAMILIES; "": the lines alone
+    start    : [parameters of the family], where the search begins;  lines : where theirs begins
+    beside   : [F], deg²/s, density of another part of the motion that stays as it is; None: there is none
+    returns  : MotionFit, whose signal contains `beside`
     """
     kind = FAMILIES.get(family)
     names = kind.names if kind else ()
-    bounds = _bounds(spectrum)
-    ends = [bounds[name] for name in names] + [one for line in lines for one in _line_bounds(spectrum, line)]
+    bounds = bounds_of(spectrum)
+    ends = [bounds[name] for name in names] + [one for line in lines for one in _linebounds_of(spectrum, line)]
     low, high = np.log(ends).T
     logs = np.clip(np.log([*start, *(getattr(line, name) for line in lines for name in LINE)]), low, high)
 
@@ -135,7 +144,7 @@ def _descend(
 
 
 def _signal(
-    spectrum: RateSpectrum, kind: DensityFamily | None, lines: tuple[SpectralLine, ...], values: np.ndarray
+    spectrum: RateSpectrum, kind: MotionFamily | None, lines: tuple[SpectralLine, ...], values: np.ndarray
 ) -> np.ndarray:
     whole = _of_lines(spectrum, lines)
     if kind is None:
@@ -158,7 +167,7 @@ def _price(spectrum: RateSpectrum, names: tuple[str, ...], lines: int) -> float:
 
 
 def line_price(spectrum: RateSpectrum) -> float:
-    """Of three parameters. The frequency costs 2·ln(frequencies) more, as it is the best of so many."""
+    """What a line costs, in units of risk: three parameters, and 2·ln(frequencies), as it is the best of so many."""
     return len(LINE) * PRICE + 2.0 * math.log(max(0.5 * float(spectrum.weight.sum()), 1.0))
 
 
@@ -167,7 +176,8 @@ def signal_of(spectrum: RateSpectrum, fit: MotionFit, lines: tuple[SpectralLine,
     return _signal(spectrum, FAMILIES.get(fit.family), lines, np.array(list(fit.values.values())))
 
 
-def _bounds(spectrum: RateSpectrum) -> dict[str, tuple[float, float]]:
+def bounds_of(spectrum: RateSpectrum) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of a parameter, by its name, for a recording with this spectrum."""
     lowest = spectrum.frequency[0]
     hertz = (0.01 * lowest, FASTEST * spectrum.rate_hz)
     size = math.sqrt(float(spectrum.noise.mean()) * spectrum.rate_hz)
@@ -177,10 +187,10 @@ def _bounds(spectrum: RateSpectrum) -> dict[str, tuple[float, float]]:
     }  # fmt: skip
 
 
-def _line_bounds(spectrum: RateSpectrum, line: SpectralLine) -> tuple[tuple[float, float], ...]:
+def _linebounds_of(spectrum: RateSpectrum, line: SpectralLine) -> tuple[tuple[float, float], ...]:
     """Of frequency, damping and s.d.: a line stays where it was found."""
     middle = min(max(line.frequency_hz, spectrum.frequency[0]), LINES_END * spectrum.rate_hz)
-    return (middle / NEAR, middle * NEAR), LINE_DAMPING, _bounds(spectrum)["sd"]
+    return (middle / NEAR, middle * NEAR), LINE_DAMPING, bounds_of(spectrum)["sd"]
 
 
 def crossing_of(spectrum: RateSpectrum, signal: np.ndarray) -> float:
@@ -247,13 +257,13 @@ def _pair_grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:
     return np.stack([own, damping, second, loss, np.sqrt(power)], axis=1)
 
 
-_GRIDS = {
-    "random_walk": _driven_grid(1),
-    "acceleration": _driven_grid(2),
-    "jerk": _driven_grid(3),
-    "markov": _markov_grid,
-    "resonance": _resonance_grid,
-    "oscillator": _oscillator_grid,
-    "pair": _pair_grid,
+FAMILIES = {
+    "random_walk": MotionFamily("random_walk", ("q",), models.driven(1), density.walk, _driven_grid(1), 1),
+    "acceleration": MotionFamily("acceleration", ("q",), models.driven(2), density.driven(2), _driven_grid(2), 2),
+    "jerk": MotionFamily("jerk", ("q",), models.driven(3), density.driven(3), _driven_grid(3), 3),
+    "markov": MotionFamily("markov", ("tau_s", "sd"), models.markov, density.markov, _markov_grid, 1),
+    "resonance": MotionFamily("oscillator", LINE, models.resonator, density.resonance, _resonance_grid, 2),
+    "oscillator": MotionFamily("oscillator", (*LINE, "q"), models.oscillator, density.oscillator, _oscillator_grid, 2),
+    "pair": MotionFamily("oscillator", PAIR, models.pair, density.pair, _pair_grid, 2),
 }
-assert FAMILIES["pair"].names == PAIR
+"""The models of the rate, by the name of what is searched for: three of them are kinds of the model oscillator."""

@@ -19,13 +19,14 @@ SETTLING = 10
 
 @dataclass(frozen=True)
 class Changing:
-    """Variances that change.
+    """Noise variances of N gyros that change from block to block.
 
-    variance [M, N] : (deg/s)² a sample;  memories [N] : what each is an average over
-    alone [M, N]    : the same from the other blocks alone
-    square [M, N]   : the blocks' own mean squares, whose expectation it is
-    freedom [M, N]  : the samples of these; 0: left out
-    outlier [M, N]  : blocks far above all others about them
+    variance : [M, N], (deg/s)² a sample, in each of M blocks
+    alone    : [M, N], (deg/s)² a sample, the same from the other blocks alone, without the block itself
+    memories : [N], over which time each gyro's variance is an average
+    square   : [M, N], (deg/s)², mean square that was seen in each block, of which `variance` is the expectation
+    freedom  : [M, N], samples that count in `square`; 0: the block is left out for this gyro
+    outlier  : [M, N] of bool, single blocks far above those about them
     """
 
     variance: np.ndarray

@@ -109,7 +109,10 @@ def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[
 
 
 def outliers(square: np.ndarray) -> np.ndarray:
-    """Single blocks far above all of their neighbours and the mean: [M, N] of squares [M, N]; zero: not known."""
+    """Which blocks are far above their neighbours on both sides and above the mean of all: [M, N] of bool.
+
+    square : [M, N], (deg/s)², mean square of each gyro in each block; zero where it is not known
+    """
     around = np.zeros_like(square)
     for shift in range(1, NEIGHBOURS + 1):
         around[shift:] = np.maximum(around[shift:], square[:-shift])
@@ -166,7 +169,11 @@ def _pairs(totals: list[np.ndarray], counts: list[float], kept: list[np.ndarray]
 
 
 def scaled_to_pairs(covariance: np.ndarray, moments: BlockMoments, outlier: np.ndarray) -> np.ndarray:
-    """A covariance [N, N] that is known but for its size, with the differences' mean variance, (deg/s)² a sample."""
+    """Give a covariance, of which only the size is unknown, the size that the differences between the gyros show.
+
+    covariance : [N, N], in any unit;  moments : of the blocks;  outlier : [M, N] of bool, blocks with one are left out
+    returns    : [N, N], (deg/s)² a sample, whose differences have the mean variance that was seen
+    """
     used = np.logical_not(outlier.any(axis=1))
     pairs = _pairs(*_totals(_without_slow(moments, used), moments, used))
     known = np.isfinite(pairs) & ~np.eye(len(pairs), dtype=bool)

@@ -33,13 +33,15 @@ One whose values have steps is stuck only where the others move by such a step f
 
 @dataclass(frozen=True)
 class BlockMoments:
-    """M blocks of the samples; they never reach over a gap, and every sample is in one.
+    """First and second moments of N gyros in M blocks of samples, none of which reaches over a gap.
 
-    start, stop [M] int64 : their samples
-    low, high [M]         : first and last block of the window about each that its slow part is the mean over
-    square [M, N, N]      : Σ dd' over the samples, (deg/s)², d = y - mean over the gyros, or over the recording
-    mean [M, N]           : mean of d, deg/s
-    excluded [M, N]       : at fault, stuck, or without a value for as long as a fine block
+    Every sample is in one block. What is counted is d = y - the mean over the gyros or, for a board at rest, y - each
+    gyro's mean over the recording.
+    start, stop : [M] int64, first sample of each block and first one after it
+    low, high   : [M], first and last block of the window about each block, over which its slow part is the mean
+    square      : [M, N, N], (deg/s)², the sum of d·d' over the samples of the block
+    mean        : [M, N], deg/s, mean of d
+    excluded    : [M, N] of bool, the gyro is at fault or stuck, or has no value for as long as a fine block
     """
 
     start: np.ndarray

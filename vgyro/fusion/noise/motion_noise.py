@@ -32,11 +32,13 @@ FEWEST_CALM = 64
 
 @dataclass(frozen=True)
 class MotionNoise:
-    """Of one recording.
+    """Noise that comes with the motion of one recording, of one size in all gyros.
 
-    variance [M] : q of each block, (deg/s)² a sample;  loud [M] : blocks that say nothing of the gyros' own noise
-    jitter_s, share : a, s, and c;  usual : mean variance of the gyros without it, (deg/s)²
-    rate, derivative : [T] the smoothed mean of the gyros, deg/s, and its derivative, deg/s²
+    variance   : [M], (deg/s)² a sample, what it adds to the variance of each gyro in each block
+    loud       : [M] of bool, blocks in which it is so large that they say nothing of the gyros' own noise
+    jitter_s   : s, the factor a of the rate's derivative;  share : the factor c of the rate
+    usual      : (deg/s)², mean variance of the gyros without it
+    rate       : [T], deg/s, smoothed mean of the gyros;  derivative : [T], deg/s², of that
     """
 
     variance: np.ndarray

@@ -39,12 +39,14 @@ MOST_COMMON = 0.9
 
 @dataclass(frozen=True)
 class Quiet:
-    """Noise in the quiet frequencies.
+    """The covariance of the noise of N gyros, as the frequencies show it at which the motion is small.
 
-    covariance [N, N] : relative to that of the differences, but for a multiple of 11', which is as `floor` says
-    variance : mean square of a difference, (deg/s)² a sample, to which it is relative
-    samples : independent samples that would tell as much;  lowest : covariance less lowest·11' is at the floor
-    flat    : the floor is as high over half of the band
+    covariance : [N, N], in units of `variance`. A part that all gyros share, a multiple of the matrix of ones, may be
+                 motion
+    variance   : (deg/s)² a sample, mean square of the differences between the gyros
+    samples    : number of independent samples that would tell as much
+    lowest     : multiple of the matrix of ones without which the covariance is as low as its lowest frequencies show it
+    flat       : half of the band is as low as those: then what is left there is white noise, and no motion
     """
 
     covariance: np.ndarray
@@ -174,9 +176,11 @@ def _usual_shift(covariance: np.ndarray, usual: np.ndarray, most: float) -> floa
 
 
 def against(quiet: Quiet, expected: np.ndarray) -> float:
-    """2Δ log likelihood of the covariance as it was seen, over an expected one [N, N], less its price (BIC).
+    """How much better the covariance that was seen explains the recording than an expected one.
 
-    What all gyros share, a multiple of 11', is left free in the expected one, since motion is that.
+    expected : [N, N], covariance of the noise in units of quiet.variance; a part that all gyros share is added to it as
+               the likelihood likes, since it may be motion
+    returns  : 2Δ log likelihood of quiet.covariance over it, less the price of its parameters (BIC; Schwarz 1978)
     """
     gyros = len(expected)
     inverse = np.linalg.inv(expected)

@@ -1,0 +1,1 @@
+"""Logs: any table with columns, of several families, opened by its content and placed in time."""

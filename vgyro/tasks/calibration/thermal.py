@@ -41,7 +41,10 @@ FEWEST_TEMPERATURES = 4
 
 @dataclass(frozen=True)
 class Cycles:
-    """Fits of one gyro in all tests in which it was measured, a switch-on each; [R]."""
+    """Fits of one gyro in the R tests on a rate table in which it was measured, one for each time it was switched on.
+
+    scale [R], deg/s a count; bias [R], counts; temperature [R], °C, NaN without a thermometer; _error : standard errors
+    """
 
     recordings: tuple[str, ...]
     scale: np.ndarray
@@ -79,7 +82,10 @@ class Cycles:
 
 @dataclass(frozen=True)
 class Rests:
-    """Block means of the recordings at rest: of the first thermal one, and of the first static one; None: none."""
+    """Means of one second from the recordings at rest: of the first thermal one and of the first static one.
+
+    Either is None where there is no such recording.
+    """
 
     thermal: tuple[str, FrameMeans] | None
     static: tuple[str, FrameMeans] | None

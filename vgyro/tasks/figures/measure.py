@@ -44,10 +44,13 @@ HEAD = ("time", "segment")
 
 @dataclass(frozen=True)
 class Still:
-    """Static figures of the series of a recording, and what they were made from.
+    """Static figures of all series of a recording, and what they were made from.
 
-    true_rate : deg/s, 0 at rest;  where : [T] samples that were taken, None: all
-    own       : place of a gyro that lacks values → its figures from those that it has
+    true_rate : deg/s, the constant rate that the figures are about, 0 at rest
+    where     : [T] of bool, samples that were taken; None: all
+    shared    : what all series share, such as the sampling;  measured : what was found of each series alone
+    own       : place of a gyro that lacks values → its figures from the values that it has
+    figures   : all figures of all series
     """
 
     true_rate: float
@@ -97,7 +100,11 @@ def columns_of(
     less: float | np.ndarray = 0.0,
     held: Mapping[tuple[Path, str], np.ndarray] | None = None,
 ) -> FileColumns:
-    """Their rates, each read when it is asked for.  held : those that are in memory"""
+    """The rates of several series, one array [T] after the other; each is read when it is asked for.
+
+    where : [T] of bool, samples that are taken; None: all;  less : deg/s, a number or [T], taken off every series
+    held  : (file, column) → rates that are in memory already
+    """
     return FileColumns([(one.path, one.column) for one in series], where, less, held=held or {})
 
 

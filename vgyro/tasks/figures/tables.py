@@ -48,9 +48,13 @@ class FigureRows:
 
 @dataclass(frozen=True)
 class Results:
-    """All that is written of one array.
+    """All that `measure` writes of one array.
 
-    singles : the first so many series are gyros;  static : None where nothing rests;  of : what `correlation` is of
+    series      : what was measured;  singles : how many of them are gyros; these come first
+    rows        : figures of metrics.parquet, for each true rate
+    static      : curves and spectra at rest; None: nothing rests
+    correlation : of the noise of the gyros;  of : which samples or errors that correlation is of, in words
+    rate_hz     : sample rate, Hz
     """
 
     series: list[MeasuredSeries]

@@ -20,11 +20,13 @@ What the noise gives is not taken off: evidence too weak to show that the others
 
 
 def of_the_array(one: SuspectedFault, parts: Sequence[Slow]) -> bool:
-    """Do the others follow what this gyro does, be it in the other direction and by less? Then it is no gyro's fault.
+    """Do the other gyros follow what this one does? Then the array does it, as in a warm-up, and no gyro is at fault.
 
-    parts : of every gyro, those of the others without this one in their combinations
-    The form is what this gyro does in the stretch; sizes of the others are in units of its own, beside what the noise
-    gives.
+    one     : the suspected fault;  parts : slow part of the residual of each gyro; in those of the others the suspected
+              gyro is left out of the combination that they are compared with
+    returns : True where, in the middle, the others do at least LIKE of it, in whatever direction
+    What this gyro does in the stretch is the form; each other gyro's residual is regressed on it, so that its size is
+    in units of this one's, and what the noise alone would give is taken off.
     """
     own = parts[one.gyro]
     run = own.run == own.run[min(one.first, len(own.run) - 1)]

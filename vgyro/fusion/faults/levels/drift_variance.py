@@ -101,9 +101,12 @@ def _white(mean: np.ndarray, found: Residuals, gyro: int, counts: np.ndarray) ->
 
 
 def contrasts(slow: Slow, length: int, before: int | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places b, mean of `length` blocks from b on less that of `before` ahead of b, and the variance of its white part.
+    """Differences between the mean of some blocks and the mean of those just before them, at every place.
 
-    Only where both lie in one run.  before : None: length
+    slow   : the residual of one gyro in block means
+    length : blocks of the mean that begins at the place;  before : blocks of the mean that ends there; None: `length`
+    returns : places [P], numbers of blocks; differences [P], deg/s; variances of their white parts [P], (deg/s)². A
+              place at which the blocks of both means do not lie in one run is left out
     """
     ahead = before or length
     sums, white = running_sum(slow.mean), running_sum(slow.white)

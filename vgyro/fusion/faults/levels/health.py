@@ -39,11 +39,14 @@ UNKNOWN = 20
 
 @dataclass(frozen=True)
 class DriftGrid:
-    """Every pair of flicker and walk [G] for runs of n points with one profile of white noise.
+    """The likelihoods of all G pairs of flicker and random walk, made ready for series of n points.
 
-    inverse : [G, n, n] of the covariance, any level taken out;  log_norm : [G]
-    changes : [n, T] forms of a change of level;  log_prior : [T] of their probabilities
-    power : [G, T] their squares in that inverse
+    It serves every series whose points have the same variances of their white parts relative to each other.
+    inverse   : [G, n, n], inverse covariance of the points, from which any constant level has been taken out
+    log_norm  : [G], logarithm of the determinants that belongs to it
+    changes   : [n, T], forms that a change of level may have, each of the size 1
+    log_prior : [T], logarithm of the probability of each form
+    power     : [G, T], squares of the forms in `inverse`: how much a change of the size 1 would show
     """
 
     inverse: np.ndarray
@@ -53,7 +56,11 @@ class DriftGrid:
     power: np.ndarray
 
     def log_likelihood(self, mean: np.ndarray, size: float) -> np.ndarray:
-        """Of coarse means [n] in units of their white part, beside at most one change of that s.d. [G]."""
+        """Log likelihood [G] of the points, with one change of level or none.
+
+        mean : [n], means in units of the root of their usual white variance;  size : s.d. of a change, in the same
+               units
+        """
         weighted = self.inverse @ mean
         steady = -0.5 * (self.log_norm + weighted @ mean)
         along = weighted @ self.changes
@@ -64,8 +71,10 @@ class DriftGrid:
 
 
 def covariances(points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of the means of n neighbouring stretches [n, n]: flicker and walk, of the units of FLICKERS and WALKS.
+    """Covariances of the means of n neighbouring stretches of one length, for flicker noise and for a random walk.
 
+    returns : flicker [n, n], such that neighbouring means differ by the variance 1; walk [n, n], such that a step from
+              one stretch to the next has the variance 1. FLICKERS and WALKS are multiples of these
     1/f noise has the covariance -ln|t| up to a constant, which is a level; its second integral is t²/2·ln|t| - 3/4·t².
     """
     lag = np.arange(points + 1, dtype=float)
@@ -123,9 +132,11 @@ def _grid(points: int, profile: tuple[int, ...]) -> DriftGrid:
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Of one gyro.
+    """How likely each pair of flicker and random walk is for the bias of one gyro.
 
-    table : [F, W] log-likelihood of flicker and walk;  unit : (deg/s)², in which they are;  length : blocks of a mean
+    table  : [F, W], log likelihood of each of FLICKERS with each of WALKS
+    unit   : (deg/s)², in which those variances are: the usual white variance of a mean
+    length : blocks of samples of each mean
     """
 
     table: np.ndarray

@@ -17,8 +17,11 @@ from vgyro.fusion.types import ArrayRates
 
 @dataclass(frozen=True)
 class Looked:
-    """events : what was found
-    gone, odd : [T, N] samples of a gyro that are no rates, and single ones that are absurd; None: there are none
+    """What the samples of a recording show by themselves, before gyros are compared in blocks.
+
+    events : the faults that were found;  gyros : N
+    gone   : [T, N] of bool, samples in which a gyro gives no rate of its own; None: there are none
+    odd    : [T, N] of bool, single samples that are absurd; None: there are none
     """
 
     events: list[FaultEvent]
@@ -28,7 +31,11 @@ class Looked:
 
 
 def look_at_samples(array: ArrayRates, length: int, zero: np.ndarray | None) -> Looked:
-    """length : of a block, samples;  zero : as of find_dead"""
+    """Look for faults that single samples show: ends of the range, stuck and missing values, copies, absurd values.
+
+    length : samples of a block, as the search in blocks uses them afterwards
+    zero   : [N, 2], deg/s, between which the rate of a count of zero lies, as for find_dead; None: not known
+    """
     gone, events = find_ends(array)
     dead = without_ends(find_dead(array, zero), gone)
     copies = _not_dead(find_copies(array), dead)
