@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks.mutation.modules import ROOT, copy_tree
 from benchmarks.mutation.run import Outcome, environment, read_outcomes, run_all, write_outcomes
 from benchmarks.mutation.sample import Entry, all_mutants, drawn, read_sample, write_sample
-from benchmarks.mutation.selection import Calls, tests_of
+from benchmarks.mutation.selection import Calls, chosen_tests
 from benchmarks.mutation.table import as_markdown
 
 OUT = Path(__file__).parent / ".results"
@@ -87,7 +87,7 @@ def run(given: argparse.Namespace, path: Path) -> int:
     outcomes = read_outcomes(path)
     known = {one.name: one for one in all_mutants(ROOT)}
     asked = [one for one in read_sample() if one.name in known and _is_asked(one, given, outcomes)]
-    tests = [tests_of(known[one.name], calls, ROOT, given.budget) for one in asked]
+    tests = [chosen_tests(known[one.name], calls, ROOT, given.budget) for one in asked]
     work = [
         (one.mutant, known[one.name], chosen, sum(calls.seconds[test] for test in chosen))
         for one, chosen in zip(asked, tests, strict=True)

@@ -42,7 +42,7 @@ class Calls:
         return [test for test, called in self.functions.items() if any(one.startswith(f"{module}::") for one in called)]
 
 
-def tests_of(mutant: Mutant, calls: Calls, root: Path, budget_s: float) -> list[str]:
+def chosen_tests(mutant: Mutant, calls: Calls, root: Path, budget_s: float) -> list[str]:
     """Node ids in the order in which they are to run; of no more than the budget together, one at least."""
     direct = calls.of(_functions(mutant, root)) or calls.in_module(mutant.module)
     files = {_file(test) for test in direct}
