@@ -24,7 +24,7 @@ from benchmarks.mutation.table import as_markdown
 OUT = Path(__file__).parent / ".results"
 LEFT_OUT = ("workflow", "browser", "benchmarks", "cli", "engine")
 """Folders of tests that are recorded by name only: they run whole pipelines, or none of these modules."""
-BUDGET_S = 60.0
+BUDGET_S = 15.0
 
 
 def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -1,8 +1,7 @@
 """Which tests a mutant is run against: those that call the changed function, by what the recorder found.
 
 A number of a module's own line counts as changed in the functions that name it; where none does, and in a class's own
-lines, in all of the module. After the tests that call it come the others of the same files, because a test file may
-share what one of its tests computed. The cheapest first, file by file, up to a budget.
+lines, in all of the module. The cheapest first, file by file, up to a budget.
 """
 
 from __future__ import annotations
@@ -45,16 +44,13 @@ class Calls:
 def chosen_tests(mutant: Mutant, calls: Calls, root: Path, budget_s: float) -> list[str]:
     """Node ids in the order in which they are to run; of no more than the budget together, one at least."""
     direct = calls.of(_functions(mutant, root)) or calls.in_module(mutant.module)
-    files = {_file(test) for test in direct}
-    beside = [test for test in calls.functions if _file(test) in files and test not in set(direct)]
     chosen: list[str] = []
     spent = 0.0
-    for group in (direct, beside):
-        for test in _cheapest(group, calls.seconds):
-            if chosen and spent + calls.seconds[test] > budget_s:
-                continue
-            chosen.append(test)
-            spent += calls.seconds[test]
+    for test in _cheapest(direct, calls.seconds):
+        if chosen and spent + calls.seconds[test] > budget_s:
+            continue
+        chosen.append(test)
+        spent += calls.seconds[test]
     return chosen
 
 
