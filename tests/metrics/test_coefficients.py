@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import AllanCurve, allan_deviation, model_deviation, noise_coefficients
-from vgyro.metrics.allan.model import low_pass_factor, solve
+from vgyro.metrics.allan.coefficient_limits import Drawing, Limits
+from vgyro.metrics.allan.model import AllanModel, VarianceCurve, fit, low_pass_factor, solve
 
 N, B, K = 6.17 / 60, 54.11 / 3600, 294.3 / 216000  # Jiang et al. (2012), table 2, in deg/s units
 
@@ -42,6 +43,20 @@ def test_terms_that_are_not_there_are_zero():
     assert fit.B.low == fit.K.low == 0
     assert fit.B.high > 0
     assert fit.K.high > 0
+
+
+@pytest.mark.parametrize("k", [0.0, K])
+def test_an_upper_limit_is_where_the_test_turns(k):
+    # By definition: with the limit as the true value, the share of the draws in which less is found is the tail.
+    curve = exact_curve(N, 0.0, k)
+    whole = VarianceCurve(curve.tau, curve.deviation**2, curve.edf)
+    model = AllanModel("NBK", curve.tau, 0.0, 1)
+    squares = fit(model, whole)
+    limits = Limits(model, whole, squares, Drawing(1000, 1).errors(model, squares, whole.edf), 0.025)
+    for term in "NBK":
+        high = limits.upper(term)
+        assert limits._share_below(term, high) == pytest.approx(0.025, abs=0.012)
+        assert high > squares["NBK".index(term)]
 
 
 def test_same_seed_same_result():
