@@ -134,6 +134,16 @@ def test_a_plateau_that_varies_five_times_as_much_is_unsteady(factor, seen):
     assert bool(unsteady_plateaus(values, time, spans)) == seen
 
 
+def test_a_plateau_of_one_sample_says_nothing():
+    # Rule: three plateaus of more than one sample; of the one left a spread of zero would make the others unsteady.
+    time = np.arange(0, 30, 0.1)
+    values = np.random.default_rng(3).normal(0, 1, (len(time), 1)) * np.where(time < 20, 1.0, 9.0)[:, None]
+    spans = [(0.0, 9.9, 0.0), (20.0, 29.9, 2.0), (10.0, 10.05, 1.0)]
+    assert unsteady_plateaus(values, time, spans) == []
+    (found,) = unsteady_plateaus(values, time, [*spans[:2], (10.0, 19.9, 1.0)])
+    assert found.message.startswith("the plateau from 20 to 29.9 s")
+
+
 def test_what_lies_after_the_end():
     assert outside_recording("plateau", [(0, 10), (50, 60.5)], 60.0) == []
     ((number, cut),) = outside_recording("plateau", [(0, 10), (50, 60.6)], 60.0)

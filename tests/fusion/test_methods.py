@@ -9,6 +9,7 @@ import pytest
 from vgyro.config import FusionOptions, VolatilityOptions
 from vgyro.errors import ConfigError, DataError
 from vgyro.fusion import METHODS, ArrayRates, CannotRun, FilterParameters, SampleWeights, run_methods, select
+from vgyro.fusion.registry import failure
 
 DEFINITIONS = ("level", "residual")
 PARAMETERS = FilterParameters(block_hz=10.0, moment_window_s=5.0, ewma_time_s=2.0)
@@ -291,3 +292,10 @@ def test_what_a_method_needs(make_array, name):
     for what, poorer in without.items():
         (outcome,) = run_methods(poorer, PARAMETERS, select([name]), ("level",))
         assert (outcome.fused is None) == (what in METHODS[name].needs)
+
+
+@pytest.mark.parametrize(("length", "said"), [(299, 299), (300, 300), (400, 300)])
+def test_a_reason_is_three_hundred_characters_at_most(length, said):
+    found = failure(METHODS["average"], ValueError("x" * length + "\nmore"))
+    assert found == f"failed: ValueError: {'x' * said} (a bug in vgyro; the traceback is in the log)"
+    assert failure(METHODS["average"], CannotRun("too short.")) == "failed: too short"

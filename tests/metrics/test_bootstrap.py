@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from vgyro.metrics import Sampling, allan_deviation, block_length, make_units, moments, read_curve, resample
-from vgyro.metrics.intervals.bootstrap import sampled_grid, scale_limits
+from vgyro.metrics.intervals.bootstrap import percentile_limits, sampled_grid, scale_limits
 
 
 def first_order(rho: float, samples: int, seed: int) -> np.ndarray:
@@ -102,3 +102,20 @@ def test_limits_of_a_size_surround_the_size_that_blocks_lose():
     low, high = scale_limits(1.0, replicates, 0.5)
     assert (low, high) == pytest.approx((0.75 / 0.8, 0.85 / 0.8))
     assert scale_limits(0.0, np.zeros(5), 0.95) == (0.0, 0.0)
+
+
+def test_percentiles():
+    # By hand: 2.5 % and 97.5 % of 0 … 1000, and 5 % and 95 % of minus that.
+    replicates = np.column_stack([np.arange(1001.0), -np.arange(1001.0)])
+    low, high = percentile_limits(replicates, 0.95)
+    np.testing.assert_allclose([low, high], [[25.0, -975.0], [975.0, -25.0]])
+    low, high = percentile_limits(replicates, 0.9)
+    np.testing.assert_allclose([low, high], [[50.0, -950.0], [950.0, -50.0]])
+
+
+def test_a_replicate_of_the_whole_has_its_figures():
+    # Expected: numpy: of one block as long as the series every replicate is the series itself.
+    rate = np.random.default_rng(1).standard_normal((30, 2)) + 5.0
+    found = resample(make_units(rate, 1.0), 3, 1, block=30)
+    np.testing.assert_allclose(found.mean, np.tile(rate.mean(axis=0), (3, 1)))
+    np.testing.assert_allclose(found.sigma, np.tile(rate.std(axis=0, ddof=1), (3, 1)))

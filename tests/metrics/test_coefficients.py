@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import AllanCurve, allan_deviation, model_deviation, noise_coefficients
-from vgyro.metrics.allan.model import low_pass_factor, solve
+from vgyro.metrics.allan.coefficient_limits import Drawing, Limits, correlation_of
+from vgyro.metrics.allan.model import AllanModel, VarianceCurve, fit, low_pass_factor, solve
 
 N, B, K = 6.17 / 60, 54.11 / 3600, 294.3 / 216000  # Jiang et al. (2012), table 2, in deg/s units
 
@@ -42,6 +43,36 @@ def test_terms_that_are_not_there_are_zero():
     assert fit.B.low == fit.K.low == 0
     assert fit.B.high > 0
     assert fit.K.high > 0
+
+
+@pytest.mark.parametrize("k", [0.0, K])
+def test_an_upper_limit_is_where_the_test_turns(k):
+    # By definition: with the limit as the true value, the share of the draws in which less is found is the tail.
+    curve = exact_curve(N, 0.0, k)
+    whole = VarianceCurve(curve.tau, curve.deviation**2, curve.edf)
+    model = AllanModel("NBK", curve.tau, 0.0, 1)
+    squares = fit(model, whole)
+    limits = Limits(model, whole, squares, Drawing(1000, 1).errors(model, squares, whole.edf), 0.025)
+    for term in "NBK":
+        high = limits.upper(term)
+        assert limits._share_below(term, high) == pytest.approx(0.025, abs=0.012)
+        assert high > squares["NBK".index(term)]
+
+
+def test_how_allan_variances_at_different_tau_scatter_together():
+    # Truth: 3000 simulated series of 512 samples, white noise and a random walk of the same Allan variance at 16 s. A
+    # correlation of so many series is known to 0.02; the formula is that of an endless series.
+    rng, tau = np.random.default_rng(1), 2.0 ** np.arange(7)
+    k = math.sqrt(3.0) / 16.0
+    rate = rng.standard_normal((3000, 512)) + k * np.cumsum(rng.standard_normal((3000, 512)), axis=1)
+    angle = np.concatenate([np.zeros((3000, 1)), np.cumsum(rate, axis=1)], axis=1)
+    found = []
+    for m in tau.astype(int):
+        steps = angle[:, 2 * m :] - 2 * angle[:, m:-m] + angle[:, : -2 * m]
+        found.append(np.mean(steps**2, axis=1))
+    simulated = np.corrcoef(found)
+    squares = np.array([1.0, 0.0, k**2])
+    np.testing.assert_allclose(correlation_of(AllanModel("NBK", tau, 0.0, 1), squares), simulated, atol=0.12)
 
 
 def test_same_seed_same_result():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import CrossAllan
+from vgyro.metrics.intervals import drift
 from vgyro.metrics.intervals.drift import DriftModel, draw, fit_drift
 
 TAU = 2.0 ** np.arange(10)
@@ -32,6 +33,22 @@ def test_exact_covariances_give_their_terms(flicker):
     np.testing.assert_allclose(model.walk, WALK, atol=1.5e-5)
     assert model.correlation(0)[0, 1] == pytest.approx(0.2 / math.sqrt(1.5), abs=2e-3)
     assert model.correlation(1e9)[0, 1] == pytest.approx(-0.5 / math.sqrt(2), abs=2e-2)
+
+
+def test_weights_settle(monkeypatch):
+    # Expected: the fit of ten passes; the weights of each are from the curve of the one before, those of the first from
+    # the covariances as they were measured, whose errors they then share.
+    rng = np.random.default_rng(1)
+    exact = covariances(WHITE, NOTHING, WALK)
+    errors = rng.chisquare(np.maximum(EDF, 2.0)) / np.maximum(EDF, 2.0)
+    noisy = CrossAllan(TAU, exact.covariance * errors[:, None, None], *(4 * [exact.edf]))
+    found = fit_drift(noisy, 2)
+    monkeypatch.setattr(drift, "PASSES", 10)
+    settled = fit_drift(noisy, 2)
+    monkeypatch.setattr(drift, "PASSES", 1)
+    first = fit_drift(noisy, 2)
+    np.testing.assert_allclose(found.walk, settled.walk, rtol=0.03, atol=1e-6)
+    assert not np.allclose(first.walk, settled.walk, rtol=0.06, atol=1e-6)
 
 
 def test_white_noise_has_no_drift():

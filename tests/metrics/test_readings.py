@@ -140,6 +140,27 @@ def test_factor_of_a_deviation_by_its_errors():
     assert math.isnan(unknown.low)
 
 
+def test_factor_of_a_deviation_by_the_square_of_the_correlation():
+    # Closed form: mean squares of Gaussian noise of correlation ρ correlate by ρ² (Isserlis 1918); of unequal data the
+    # covariance is ρ² times the smaller variance. By hand: 0.01 + 0.02 - 2·0.25·0.01 = 0.025.
+    half = np.array([[1.0, 0.5], [0.5, 1.0]])
+    for variance in (np.array([0.01, 0.02]), np.array([0.02, 0.01])):
+        found = improvement_of_deviation(np.array([2.0]), 1.0, variance, half)
+        assert np.log(found.high / 2.0) == pytest.approx(1.959964 * math.sqrt(0.025), rel=1e-6)
+    # Known truth: 4000 pairs of 200 samples of ρ = 0.7. s.d. of the logarithm of the ratio of their s.d.
+    rng, ρ = np.random.default_rng(2), 0.7
+    first = rng.standard_normal((4000, 200))
+    second = ρ * first + math.sqrt(1 - ρ**2) * rng.standard_normal((4000, 200))
+    spread = float(np.std(np.log(first.std(axis=1) / second.std(axis=1))))
+    found = improvement_of_deviation(np.ones(1), 1.0, np.full(2, 1 / 400), np.array([[1.0, ρ], [ρ, 1.0]]))
+    assert np.log(found.high) / 1.959964 == pytest.approx(spread, rel=0.05)
+    # Two single gyros have half the mean each; they are independent of each other, and ρ = 0.4 with the virtual one:
+    # (1/4)(0.01 + 0.01) + 0.01 - 2·(1/2)·2·(0.16·0.01).
+    third = np.array([[1.0, 0.0, 0.4], [0.0, 1.0, 0.4], [0.4, 0.4, 1.0]])
+    found = improvement_of_deviation(np.array([1.0, 1.0]), 1.0, np.full(3, 0.01), third)
+    assert np.log(found.high) == pytest.approx(1.959964 * math.sqrt(0.015 - 0.0032), rel=1e-6)
+
+
 def test_poses_do_not_enter_sigma():
     rng = np.random.default_rng(3)
     segment = np.repeat(np.arange(10), 1500)

@@ -17,6 +17,7 @@ from vgyro.metrics import (
     paper_readings,
     spectral_density,
 )
+from vgyro.metrics.static import figures
 from vgyro.metrics.static.figures import static_figures
 from vgyro.metrics.static.readings import density_ratio
 from vgyro.metrics.static.series import replaced
@@ -51,6 +52,18 @@ def test_short_losses_are_counted_and_do_not_break_the_curve():
     assert found.readings["arw"].value == pytest.approx(whole["arw"].value, rel=0.003)
     # Almost every second is there for the covariances, too.
     assert len(found.seconds) > 1150
+
+
+def test_the_lowest_low_pass_is_felt_in_the_drift(monkeypatch):
+    # By definition: τ below some time constants 1/(2π·f) of the lowest low-pass say nothing of the drift.
+    shortest = []
+    monkeypatch.setattr(figures, "fit_drift", lambda *given: shortest.append(given[2]))
+    sampling = Sampling.of(RATE_HZ, np.zeros(6000, int))
+    filters = [LowPass(), LowPass(2.0), LowPass(0.5)]
+    static_figures([white(6000, seed) for seed in range(3)], sampling, 2, filters, OPTIONS)
+    static_figures([white(6000, seed) for seed in range(2)], sampling, 2, filters[:1] * 2, OPTIONS)
+    assert shortest[0] == pytest.approx(figures.SETTLED / (2 * math.pi * 0.5))
+    assert shortest[1] <= shortest[0]
 
 
 def test_outliers_are_counted_and_change_no_coefficient():

@@ -1,5 +1,6 @@
 """Which window's model gives which sample's weights, by hand, and what the weights may know."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -173,6 +174,20 @@ def test_the_reference_engine_gives_the_same(broken_series):
         np.testing.assert_array_equal(said(native[mode]), said(reference[mode]))
         for name in ("weights", "sigma", "deviation"):
             np.testing.assert_allclose(getattr(native[mode], name), getattr(reference[mode], name), atol=1e-11)
+
+
+def test_ccc_is_dcc_of_a_and_b_zero():
+    # Bollerslev (1990): the correlation is the target throughout, whatever the a and b that DCC found.
+    values = np.random.default_rng(0).standard_normal((300, 3))
+    models = live(windows(np.zeros(300), 100, 30))
+    still = replace(models, a=np.zeros(len(models.a)), b=np.zeros(len(models.b)))
+    runs = [Window(0, 300)]
+    ccc = weights_of_windows(values, models, runs, "level", MODES, "ccc", 30)
+    dcc = weights_of_windows(values, still, runs, "level", MODES, "dcc", 30)
+    moving = weights_of_windows(values, models, runs, "level", MODES, "dcc", 30)
+    for mode in MODES:
+        np.testing.assert_array_equal(ccc[mode].weights, dcc[mode].weights)
+        assert not np.allclose(ccc[mode].weights, moving[mode].weights, rtol=1e-3, atol=1e-3)
 
 
 @pytest.mark.parametrize("definition", DEFINITIONS)

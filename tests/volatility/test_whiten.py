@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from statsmodels.regression.linear_model import burg
+from statsmodels.tsa.stattools import pacf_burg
 
 from vgyro.volatility.arch_lm import arch_lm
 from vgyro.volatility.effects.whiten import block_gain, fit_autoregression, running_median, whiten
@@ -115,6 +117,19 @@ def test_burg_finds_a_known_autoregression():
     assert found[:2] == pytest.approx([0.5, -0.3], abs=5 / np.sqrt(20_000))
     assert np.abs(found[2:]).max(initial=0) < 5 / np.sqrt(20_000)
     assert fit_autoregression(np.zeros(100)).size == 0
+
+
+def test_the_order_of_the_lowest_aicc():
+    # Expected: statsmodels' partial correlations by Burg's method, σ² = σ₀²·Π(1 - k²), AICc of each order by its
+    # definition (Hurvich & Tsai 1989), up to 20 and a sample in 20, and statsmodels' fit of the best.
+    for seed, samples in ((1, 600), (2, 600), (3, 200)):
+        series = lfilter([1], [1, -0.5, 0.3], np.random.default_rng(seed).standard_normal(samples))
+        partial = pacf_burg(series, min(20, samples // 20), demean=False)[0][1:]
+        orders = np.arange(len(partial) + 1)
+        variance = np.mean(series**2) * np.cumprod(np.append(1.0, 1 - partial**2))
+        best = int(np.argmin(samples * np.log(variance) + 2 * orders * samples / (samples - orders - 1)))
+        assert 0 < best < len(partial)
+        np.testing.assert_allclose(fit_autoregression(series), burg(series, best, demean=False)[0], atol=1e-9)
 
 
 def test_running_median_follows_a_line_and_a_step_exactly():

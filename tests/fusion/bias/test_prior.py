@@ -1,13 +1,18 @@
 """What is known of the constants beforehand: the centre of the biases, seen or not, against dense algebra and truth."""
 
+import math
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.estimate import slow_errors, slow_variance
 from vgyro.fusion.bias.model import BiasEvidence, Walk
-from vgyro.fusion.bias.prior import Prior
+from vgyro.fusion.bias.prior import Prior, _Look, _posteriors
+from vgyro.fusion.bias.smoother import Filtered
 
 MOVING = FilterParameters(in_motion=True)
 GYROS, SECONDS, TAU = 6, 600, 30.0
@@ -87,3 +92,56 @@ def test_without_standstill_the_centre_is_zero():
         array, _ = recording(3, centre, 0.01, moving)
         found.append(slow_errors(array, MOVING, ARW**2, walk=Walk(RRW, TAU)).bias)
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
+
+
+def measured(bias, sd):
+    """Constants that are measured one by one, with the s.d. `sd` [N]: the squares of their rows are all that counts."""
+    rows = np.column_stack([np.asarray(bias) / sd, np.diag(1.0 / np.asarray(sd))])
+    nothing = np.zeros(0)
+    return Filtered(nothing, nothing, nothing, nothing, nothing, rows.T @ rows, 0.0)
+
+
+def look_at(bias, sd):
+    return _Look.of(measured(bias, sd), slice(0, len(bias)))
+
+
+def test_a_gyro_far_off_costs_the_odds_of_three_in_a_thousand():
+    # Expected: by definition: sets of at most three, and less than half, of the gyros farthest from the median, each
+    # gyro for the odds 0.003/0.997; its variance is that of its own square, of the others s².
+    look = look_at([0.01, -0.02, 0.015, -0.01, 0.0, 5.0], np.full(6, 1e-3))
+    sizes, (variances, logarithms) = look.sizes(), look.with_far_off()
+    assert look.farthest[0] == 5
+    assert len(variances) == len(sizes) * (1 + 6 + 15)
+    price = math.log(0.003 / 0.997)
+    expected = np.repeat([0.0] + [price] * 6 + [2 * price] * 15, len(sizes))
+    np.testing.assert_allclose(logarithms, expected, rtol=1e-12)
+    far = variances[len(sizes)]
+    assert far[5] == pytest.approx(5.0**2, rel=0.01)
+    np.testing.assert_array_equal(far[:5], sizes[0])
+    np.testing.assert_array_equal(variances[0], np.full(6, sizes[0]))
+    assert len(look_at(np.linspace(-1, 1, 9), np.full(9, 1e-3)).with_far_off()[0]) % (1 + 6 + 15 + 20) == 0
+
+
+def test_sizes_of_the_spread():
+    # Expected: by definition: from half the s.d. of one measurement to five times the largest constant, in steps of a
+    # factor e^½ at most.
+    look = look_at([0.3, -0.4, 0.1, 0.0, 2.0], [0.01, 0.02, 0.03, 0.04, 0.05])
+    sizes = np.sqrt(look.sizes())
+    assert sizes[0] == pytest.approx(0.5 * 0.03)
+    assert sizes[-1] == pytest.approx(5.0 * np.sqrt(look.square.max()))
+    steps = [math.log(after / before) for before, after in pairwise(sizes)]
+    assert max(steps) <= 0.5
+    assert max(steps) > 0.5 * (len(steps) - 1) / len(steps)
+
+
+def test_likelihood_of_priors_is_that_of_the_normal_law():
+    # Expected: scipy's normal law of the measurements, of covariance prior + noise, up to what all priors share.
+    bias, sd = np.array([0.3, -0.4, 0.1]), np.array([0.1, 0.2, 0.3])
+    filtered = measured(bias, sd)
+    priors = np.array([[1.0, 2.0, 3.0], [0.01, 0.1, 0.0], [4.0, 0.5, 0.2]])
+    means, covariances, found = _posteriors(filtered, priors)
+    expected = [multivariate_normal(cov=np.diag(one + sd**2)).logpdf(bias) for one in priors]
+    np.testing.assert_allclose(found - found[0], np.array(expected) - expected[0], rtol=1e-9)
+    share = priors / (priors + sd**2)
+    np.testing.assert_allclose(means, share * bias, rtol=1e-9)
+    np.testing.assert_allclose(covariances, [np.diag(one) for one in share * sd**2], atol=1e-12)

@@ -89,6 +89,15 @@ def test_noise_of_pieces_with_holes(phi):
         )
 
 
+def test_noise_between_known_samples_dense():
+    # Expected: white noise known at some samples, the others by np.interp, its Fourier sums from the dense matrix.
+    places, power = np.array([0, 1, 4, 6, 7, 11]), np.array([1.0, 2.0, 0.5, 3.0, 1.0, 4.0])
+    fill = np.column_stack([np.interp(np.arange(12), places, one) for one in np.eye(len(places))])
+    turn = np.exp(-2j * np.pi * np.arange(1, 6) / 12.0)
+    sums = turn[:, None] ** np.arange(12) @ fill
+    np.testing.assert_allclose(evidence._of_filled(places, power, turn), np.abs(sums) ** 2 @ power, rtol=1e-9)
+
+
 def test_estimated_risk_is_that_of_the_smoother():
     # Known truth: motion of three poles, 24 seeds; two models that are wrong, with q from too little to too much. The
     # mean of the estimates is the mean of the true squared errors, within three standard errors of that.

@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
+from vgyro.fusion.noise import band
 from vgyro.fusion.noise.band import in_band
 from vgyro.fusion.noise.parity import parity_variances
 from vgyro.fusion.ours.recommended import recommended
@@ -91,3 +92,18 @@ def test_recommended_weighs_the_band_that_passes():
     cut = slice(200, -200)
     assert found.rate[cut].std() / average[cut].std() == pytest.approx(best, rel=0.06)
     assert "which pass" in found.note
+
+
+@pytest.mark.parametrize("size", [2.55, 2.45])
+def test_levels_are_drawn_together(monkeypatch, size):
+    # By hand: levels of equal error about a mean of 0, F = Σ level²/(6 - 1), bound F(0.001; 5, 15) = 7.57 (tables);
+    # then (1 - 1/F) of each is kept (James & Stein 1961).
+    level = size * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    monkeypatch.setattr(band, "_log_levels", lambda *_: (0.5 + 0.1 * level, np.full(6, 0.1)))
+    array = simulated(np.zeros(6))
+    variances = parity_variances(array, FilterParameters(), changing=False)
+    found, note = in_band(array, variances, 1.0)
+    ratio = 6.0 * size**2 / 5.0
+    assert bool(note) == (ratio > 7.57)
+    expected = np.exp(0.1 * level * (1.0 - 1.0 / ratio)) if ratio > 7.57 else np.ones(6)
+    np.testing.assert_allclose((found.variance / variances.variance)[0], expected, rtol=1e-9)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vgyro.engine.cross_spectra import CrossSpectra
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.noise.parity import parity_variances
+from vgyro.fusion.noise.quiet_frequencies import Quiet, _usual_shift, _weighed
 
 RATE_HZ, SAMPLES, GYROS = 50.0, 30_000, 6
 MOVING = FilterParameters(in_motion=True)
@@ -44,3 +46,43 @@ def test_a_gyro_at_fault_now_and_then_does_not_let_the_motion_in() -> None:
     found = parity_variances(simulated(0.5, 2, faults), MOVING)
     assert "frequencies at which the motion is small" in found.note
     assert float(np.median(found.combined_variance())) == pytest.approx(1.5 / GYROS, rel=0.06)
+
+
+def banded(levels):
+    """Spectra of two parts of four uncorrelated gyros of variance 1, and motion that makes these levels in 8 bands."""
+    lines = 8 * 64
+    # The mean of four has the density 1/4, the differences from it 3/4 each: a level of x over them is 3/4·x - 1/4.
+    motion = np.repeat(0.75 * np.asarray(levels) - 0.25, lines // 8)
+    density = np.eye(4) + motion[:, None, None]
+    windows = np.full((2, 4, 4), 50.0)
+    return CrossSpectra(np.arange(1.0, lines + 1), 50.0 * np.tile(density, (2, 1, 1, 1)), windows, 2 * lines)
+
+
+@pytest.mark.parametrize(("fourth", "flat"), [(1.12, True), (1.3, False)])
+def test_a_floor_that_is_flat_over_half_of_the_band(fourth, flat):
+    # Rule: at least four of eight bands within 15 % of the mean of the three lowest.
+    found = _weighed(banded([0.5, 0.5, 0.5, 0.5 * fourth, 5.0, 9.0, 7.0, 8.0]), np.full(4, 0.25))
+    assert found.flat == flat
+    np.testing.assert_allclose(found.covariance - found.covariance.mean(), (np.eye(4) - 0.25) / 0.75, atol=0.02)
+
+
+def test_what_is_common_beyond_the_usual():
+    # By definition: the median of the pairs' correlations, less the usual ones, is zero then.
+    usual = np.array([[1.0, 0.1, 0.2], [0.1, 1.0, 0.0], [0.2, 0.0, 1.0]])
+    seen = np.array([[1.0, 0.3, 0.6], [0.3, 1.2, 0.1], [0.6, 0.1, 0.9]])
+    shift = _usual_shift(seen, usual, 0.9)
+    left = seen - shift
+    sigma = np.sqrt(np.diag(left))
+    apart = (left / np.outer(sigma, sigma) - usual)[np.triu_indices(3, 1)]
+    assert np.median(apart) == pytest.approx(0.0, abs=1e-9)
+    # More is common than may be taken off: as much as may.
+    assert _usual_shift(np.full((3, 3), 0.9) + 0.1 * np.eye(3), usual, 0.2) == 0.2
+
+
+@pytest.mark.parametrize(("flat", "lowest", "shift"), [(True, 0.1, 0.1), (True, 5.0, 0.585), (False, 0.1, 0.3)])
+def test_how_much_of_the_common_part_is_motion(flat, lowest, shift):
+    # By hand: two gyros of variance 0.7 and correlation 0 beside 0.3 of motion: the best combination has 0.65, of which
+    # nine tenths may be motion. A flat floor says how much it is, else the usual correlation, 0, does.
+    seen = 0.7 * np.eye(2) + 0.3
+    found = Quiet(seen, 1.0, 1e4, lowest, flat).noise(np.eye(2))
+    np.testing.assert_allclose(seen - found, shift, atol=1e-9)

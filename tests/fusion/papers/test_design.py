@@ -31,6 +31,20 @@ def test_process_noise_of_jiang_is_a_bandwidth(q, hz):
     assert design.q_for_bandwidth(information, hz) == pytest.approx(q, rel=0.003)
 
 
+def test_pole_of_a_markov_rate():
+    # Closed forms: without noise of the process the rate fades with τ; with it s² = 1/τ² + D·q.
+    assert design.pole(D, 0.0, 0.25) == pytest.approx(4.0)
+    assert design.pole(16.0, 1.0, 1.0 / 3.0) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("x", [0.01, 1.0, 30.0])
+def test_allan_deviation_behind_a_low_pass(x):
+    # Expected: by quadrature: 4·∫ sin⁴(πfτ)/(πfτ)²/(1 + (2πf/s)²) df over that without the low-pass, 1/τ.
+    f = (np.arange(4_000_000) + 0.5) * 1e-4
+    share = np.sin(np.pi * f) ** 4 / (np.pi * f) ** 2 / (1.0 + (2 * np.pi * f / x) ** 2)
+    assert design.allan_ratio(1.0, x) == pytest.approx(math.sqrt(4.0 * share.sum() * 1e-4), rel=2e-3)
+
+
 def test_chang_reads_q_off_the_bandwidth():
     # Expected: √q = 2π·BW/√D.
     assert math.sqrt(design.q_for_bandwidth(D, 2.0)) == pytest.approx(2 * math.pi * 2.0 / math.sqrt(D), rel=1e-14)

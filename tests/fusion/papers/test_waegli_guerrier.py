@@ -194,3 +194,20 @@ def test_reasons(changing):
     array = changing(60)
     with pytest.raises(CannotRun, match="residual of gyro 1: no variance"):
         waegli_guerrier(replace(array, rate=np.repeat(array.rate[:, :1], 4, axis=1)), PARAMETERS)
+
+
+@pytest.mark.parametrize(("samples", "why"), [(19, "no stretch of 20 samples"), (20, "residual of gyro 1: too short")])
+def test_twenty_samples_without_a_gap(make_array, samples, why):
+    # From 20 samples on there is an ARMA model; GARCH needs more.
+    segment = np.arange(3 * samples, dtype=np.int32) // samples
+    with pytest.raises(CannotRun, match=why):
+        fit_residuals(make_array(3 * samples, [0.1, 0.1, 0.1], segment=segment), "native")
+
+
+def test_a_million_samples_are_enough(monkeypatch, make_array):
+    # Rule: the first million samples of the longest stretch.
+    asked = []
+    monkeypatch.setattr("vgyro.fusion.papers.waegli_guerrier._model", lambda v, *_: asked.append(len(v)))
+    for samples, fitted in ((1_200_000, 1_000_000), (900_000, 900_000)):
+        fit_residuals(make_array(samples, [0.1, 0.1]), "native")
+        assert asked[-2:] == [fitted, fitted]

@@ -9,6 +9,7 @@ from scipy.stats import truncnorm
 
 from vgyro.fusion import ArrayNoise, ArrayRates, Fused
 from vgyro.fusion.samples.clipped import clipped, without_clipped
+from vgyro.fusion.samples.quantised import step_of
 from vgyro.fusion.samples.unseen import PART, stand_in
 
 GYROS, SAMPLES, RATE_HZ = 3, 6000, 50.0
@@ -156,3 +157,35 @@ def test_samples_that_were_lost_are_likely_anywhere():
     fused = Fused(np.zeros(SAMPLES))
     assert guess.beyond(fused) is fused
     assert stand_in(array_of(truth), None) is None
+
+
+@pytest.mark.parametrize(("run", "found"), [(7, False), (8, True)])
+def test_a_run_that_chance_would_not_give(run, found):
+    # Rule: log of the chance of a run below -(16 + log T), where what is next to the end is no pile. Of steps of 0.02
+    # and noise of 0.2 two samples are alike with the chance 0.02/(2·√π·0.2) = 0.0282: each further one adds 3.57 to a
+    # run, and 16 + log 6000 = 24.7 are between six of them and seven.
+    array = array_of(50.0 * np.sin(np.arange(SAMPLES) / 40.0), step=0.02)
+    array.rate[1000 : 1000 + run, 0] = 70.0
+    array.rate[2000:2200:20, 0] = 69.9
+    assert (clipped(array) is not None) == found
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_an_end_is_far_from_the_middle(far):
+    # Rule: four deviations of the noise from the middle of the gyro's other values: a value that is repeated nearer to
+    # them is no end, as of a gyro that is stuck for a while at rest.
+    array = array_of(np.zeros(SAMPLES))
+    array.rate[:, 0] = np.minimum(array.rate[:, 0], 0.99 if far else 0.59)
+    array.rate[1000:1100, 0] = 1.0 if far else 0.6
+    assert (clipped(array) is not None) == far
+
+
+def test_a_grid_finer_than_the_rounding_is_none():
+    # Rule: twice the rounding, four units of the last place, is no more than a twentieth of a step. In single precision
+    # beside a bias of 1000 that is 0.0191.
+    noise = np.random.default_rng(1).standard_normal(5000)
+    for step, seen in ((0.018, 0.0), (0.021, 0.021)):
+        assert step_of((1000.0 + step * np.rint(noise / step)).astype(np.float32)) == pytest.approx(seen, rel=0.01)
+    assert step_of(noise) == 0.0
+    assert step_of((0.01 * np.rint(100.0 * noise)).astype(np.float32)) == pytest.approx(0.01, rel=1e-3)
+    assert np.isnan(step_of(np.full(100, 3.0)))
