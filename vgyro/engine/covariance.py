@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.engine.recursions import dcc_correlation, garch_variance
 
 SINGULAR = 1e-12
@@ -41,13 +42,14 @@ def conditional_covariance(
     return np.concatenate([np.repeat(covariance[:1], first, axis=0), covariance])
 
 
-def usable(H: np.ndarray) -> np.ndarray:
+def usable(H: Floats) -> Bools:
     """Which matrices H [..., N, N] are finite, symmetric and positive definite: array [...] of bool."""
-    finite = np.isfinite(H).all(axis=(-1, -2))
+    finite = np.asarray(np.isfinite(H).all(axis=(-1, -2)))
     safe = np.where(finite[..., None, None], H, 0.0)
     variance = np.diagonal(safe, axis1=-2, axis2=-1)
     positive = finite & (variance > 0).all(axis=-1)
     scale = np.sqrt(np.where(positive[..., None], variance, 1.0))
     correlation = np.where(positive[..., None, None], safe, 0.0) / (scale[..., :, None] * scale[..., None, :])
     symmetric = (np.abs(correlation - np.swapaxes(correlation, -1, -2)) <= ASYMMETRY).all(axis=(-1, -2))
-    return positive & symmetric & (np.linalg.eigvalsh(correlation)[..., 0] > SINGULAR)
+    found: Bools = positive & symmetric & (np.linalg.eigvalsh(correlation)[..., 0] > SINGULAR)
+    return found

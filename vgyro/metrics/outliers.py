@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats, Ints
+
 NORMAL_MAD = 0.6744897501960817  # median of |z| of a normal z
 NORMAL = (0.68, 0.9944578832097531), (0.8, 1.2815515655446004)  # quantiles of |z|
 BLOCK = 512  # samples that share a scale
@@ -91,7 +93,7 @@ def _suspects(rate: np.ndarray, length: int, screen: float, floor: float) -> tup
     return places, np.repeat(scale, 2 * REACH + 1)[inside][first_of]
 
 
-def _block_medians(bend: np.ndarray, length: int) -> np.ndarray:
+def _block_medians(bend: Floats, length: int) -> Floats:
     """Median of each block; samples of an incomplete last one belong to the block before."""
     blocks = len(bend) // length
     if blocks == 0:
@@ -99,7 +101,7 @@ def _block_medians(bend: np.ndarray, length: int) -> np.ndarray:
     return np.median(bend[: blocks * length].reshape(blocks, length), axis=1)
 
 
-def _far_off(rate: np.ndarray, places: np.ndarray, scale: np.ndarray, threshold: float, floor: float) -> np.ndarray:
+def _far_off(rate: Floats, places: Ints, scale: Floats, threshold: float, floor: float) -> Bools:
     """Which of `places` [K] lie far off the levels before and after, by the scale there and by that of their sides."""
     last = len(rate) - 1
     distance, spread = [], []
@@ -120,7 +122,8 @@ def _far_off(rate: np.ndarray, places: np.ndarray, scale: np.ndarray, threshold:
     around = _quantile(np.hstack(spread), NORMAL[0])
     near = np.maximum(*(_quantile(one, NORMAL[1]) for one in spread))
     limit = np.maximum(scale, np.maximum(AROUND * around, NEAR * np.maximum(near, floor)))
-    return nearest > threshold * limit
+    far: Bools = nearest > threshold * limit
+    return far
 
 
 def _quantile(spread: np.ndarray, normal: tuple[float, float]) -> np.ndarray:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
+from vgyro.arrays import Floats, Ints
 from vgyro.config import Definition
 
 
 def window_batch(
-    values: np.ndarray,
-    starts: np.ndarray,
+    values: Floats,
+    starts: Ints,
     length: int,
     ahead: int,
     definition: Definition,
     span: int = 15,
-    stretch_starts: np.ndarray | None = None,
-) -> np.ndarray:
+    stretch_starts: Ints | None = None,
+) -> Floats:
     """r_t of K windows and of `ahead` samples after each: window_residuals, window by window.
 
     values  : [m, N] deg/s, samples of the series; NaN where a gyro has no value, and so is r_t then
@@ -32,7 +33,8 @@ def window_batch(
     if definition == "level":
         return block
     if definition == "demeaned":
-        return block - block[:, :length].mean(axis=1, keepdims=True)
+        centred: Floats = block - block[:, :length].mean(axis=1, keepdims=True)
+        return centred
     if definition == "difference":
         r = np.empty(block.shape)
         np.subtract(block[:, 1:], block[:, :-1], out=r[:, 1:])
@@ -42,10 +44,11 @@ def window_batch(
     low, high = span_about(total, length, span // 2)
     median = _cut(median_of_gyros(values), starts, total)
     sums = np.concatenate([np.zeros((len(starts), 1)), np.cumsum(median, axis=1)], axis=1)
-    return block - ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
+    centred = block - ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
+    return centred
 
 
-def median_of_gyros(values: np.ndarray) -> np.ndarray:
+def median_of_gyros(values: Floats) -> Floats:
     """Median [m] over the gyros [m, N] that have a value; in no row all of them lack one."""
     if not np.isnan(values).any():
         return np.median(values, axis=1)

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine.models import (
     A_ZERO,
     B_ZERO,
@@ -158,12 +159,14 @@ class _Point:
     b: np.ndarray
 
     @property
-    def shrink(self) -> np.ndarray:
-        return np.sqrt(np.maximum(1 - self.a**2 - self.b**2, 0.0))
+    def shrink(self) -> Floats:
+        shrink: Floats = np.sqrt(np.maximum(1 - self.a**2 - self.b**2, 0.0))
+        return shrink
 
     @property
-    def constant(self) -> np.ndarray:
-        return np.outer(self.shrink, self.shrink) * (self.root @ self.root.T)
+    def constant(self) -> Floats:
+        constant: Floats = np.outer(self.shrink, self.shrink) * (self.root @ self.root.T)
+        return constant
 
 
 class _Likelihood:
@@ -270,7 +273,7 @@ class _Coordinates:
     def _triangle(self) -> tuple[np.ndarray, np.ndarray]:
         return np.tril_indices(len(self.root))
 
-    def _size(self, x: np.ndarray) -> np.ndarray:
+    def _size(self, x: Floats) -> Floats:
         return np.sqrt(1 / (1 + np.exp(-x[: self.count])))
 
 
@@ -354,12 +357,13 @@ def _status(a: np.ndarray, b: np.ndarray, r: np.ndarray) -> str:
     return B_ZERO if (b**2 < BETA_NEAR_ZERO).any() else CONVERGED
 
 
-def _filtered(driven: np.ndarray, decay: np.ndarray) -> np.ndarray:
+def _filtered(driven: Floats, decay: Floats) -> Floats:
     """y_t = x_t + decay·y_{t-1} of each column of x [T, M]; decay [M]."""
     from scipy.signal import lfilter
 
     if (decay == decay[0]).all():
-        return lfilter([1.0], [1.0, -decay[0]], driven, axis=0)
+        filtered: Floats = lfilter([1.0], [1.0, -decay[0]], driven, axis=0)
+        return filtered
     columns = [lfilter([1.0], [1.0, -one], column) for one, column in zip(decay, driven.T, strict=True)]
     return np.stack(columns, axis=1)
 
@@ -372,5 +376,6 @@ def _full(packed: np.ndarray, n: int) -> np.ndarray:
     return packed[:, place]
 
 
-def _symmetric(packed: np.ndarray, n: int) -> np.ndarray:
-    return _full(packed[None], n)[0]
+def _symmetric(packed: Floats, n: int) -> Floats:
+    full: Floats = _full(packed[None], n)[0]
+    return full

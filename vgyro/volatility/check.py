@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 PERSISTENCE_MAX = 1.0 - 1e-6
 GRID_ALPHA = (0.0, 0.005, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32, 0.45, 0.65, 0.9)
 GRID_PERSISTENCE = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985, 0.993, 0.998)
@@ -57,7 +59,7 @@ def _cost_and_slope(point: np.ndarray, e: np.ndarray) -> tuple[float, np.ndarray
     return -float(values[0]), -(values[4:] - values[1:4]) / width
 
 
-def _log_likelihood(e: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _log_likelihood(e: Floats, points: Floats) -> Floats:
     """Log-likelihood of a series of mean square 1 at many points (ω, α + β, α/(α + β)) [P, 3]."""
     omega, total, share = points.T
     alpha, beta = total * share, total * (1.0 - share)
@@ -68,7 +70,8 @@ def _log_likelihood(e: np.ndarray, points: np.ndarray) -> np.ndarray:
     for t in range(1, len(e)):
         variance[t] = driven[t - 1] + beta * variance[t - 1]
     summed = (np.log(variance) + square[:, None] / variance).sum(axis=0)
-    return -0.5 * (len(e) * math.log(2.0 * math.pi) + summed)
+    likelihood: Floats = -0.5 * (len(e) * math.log(2.0 * math.pi) + summed)
+    return likelihood
 
 
 def covariance_after(
@@ -91,6 +94,7 @@ def covariance_after(
     return last, _covariance(h, Q)
 
 
-def _covariance(h: np.ndarray, Q: np.ndarray) -> np.ndarray:
+def _covariance(h: Floats, Q: Floats) -> Floats:
     scale = np.sqrt(h / np.diag(Q))
-    return Q * np.outer(scale, scale)
+    covariance: Floats = Q * np.outer(scale, scale)
+    return covariance

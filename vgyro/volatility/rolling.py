@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats, Ints
 from vgyro.config import CorrelationModel, Definition, Mode
 from vgyro.engine.models import NO_VARIANCE, NOT_POSITIVE_DEFINITE, ConditionalWeights
 from vgyro.volatility.batches import window_batch
@@ -223,9 +224,9 @@ def _residuals(
 
 
 def _weigh(
-    r: np.ndarray,
+    r: Floats,
     part: WindowModels,
-    gyros: np.ndarray,
+    gyros: Ints,
     begin: int,
     end: int,
     correlation: CorrelationModel,

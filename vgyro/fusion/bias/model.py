@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.errors import DataError
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.common_walk import walk_correlation
@@ -126,7 +127,8 @@ class BiasEvidence:
     @property
     def gyros(self) -> int:
         """N."""
-        return self.means.shape[1]
+        gyros: int = self.means.shape[1]
+        return gyros
 
     @property
     def plain(self) -> int:
@@ -136,7 +138,8 @@ class BiasEvidence:
     @property
     def has_slopes(self) -> bool:
         """Temperature slopes are among the constants."""
-        return self.design.shape[2] > self.plain
+        has: bool = self.design.shape[2] > self.plain
+        return has
 
     @cached_property
     def unseen(self) -> np.ndarray:
@@ -263,8 +266,8 @@ def log_likelihood(filtered: Filtered, prior: np.ndarray) -> float:
 
 
 def log_likelihood_slope(
-    evidence: BiasEvidence, blocks: Information, filtered: Filtered, prior: np.ndarray, rrw: np.ndarray
-) -> np.ndarray:
+    evidence: BiasEvidence, blocks: Information, filtered: Filtered, prior: Floats, rrw: Floats
+) -> Floats:
     """Derivatives [N] of log_likelihood by log K_i, exactly.
 
     With respect to Q_t it is ½(rr' - Λ), and with constants β that are not known ½(E rr' - Λ) over their posterior.
@@ -279,7 +282,8 @@ def log_likelihood_slope(
     excess = np.tensordot(grown[:, None, None] * both, both, axes=([0, 2], [0, 2])) - np.tensordot(
         grown, weight, axes=1
     )
-    return rrw * ((excess * evidence.walks) @ rrw)
+    slope: Floats = rrw * ((excess * evidence.walks) @ rrw)
+    return slope
 
 
 def with_shared_slope(evidence: BiasEvidence, walk: Walk, bias: np.ndarray, constants: Constants) -> Constants:

@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.heavy_tails.scale_mixture import ScaleMixture
 
 CENTRE_S, FEWEST_CENTRE = 0.5, 16
@@ -239,20 +240,22 @@ def _predicted(alone: np.ndarray, own: np.ndarray, reach: int) -> np.ndarray:
 
 
 @lru_cache
-def _kernel(reach: int) -> np.ndarray:
+def _kernel(reach: int) -> Floats:
     """Weights [2·reach + 1] of a parabola's value in the middle, by least squares without the middle."""
     x = np.arange(-reach, reach + 1) / reach
     design = np.stack([np.ones_like(x), x**2], axis=1)
     design[reach] = 0.0
-    return np.linalg.pinv(design)[0]
+    kernel: Floats = np.linalg.pinv(design)[0]
+    return kernel
 
 
-def _extra(left: np.ndarray, own: np.ndarray, window: int) -> np.ndarray:
+def _extra(left: Floats, own: Floats, window: int) -> Floats:
     """Variance [n] of a prediction about each place, from how far off it is [n]: with the sample's own taken off."""
     usual = np.minimum(own, UNSURE * _usual(own))
     square = np.minimum(left**2, FAR * np.maximum(np.median(_some(left**2)), usual))
     count = box(np.ones(len(left)), window)
-    return np.maximum(box(square - usual, window), SURE * box(usual, window)) / count
+    extra: Floats = np.maximum(box(square - usual, window), SURE * box(usual, window)) / count
+    return extra
 
 
 def _near(borders: np.ndarray, samples: int, reach: int) -> np.ndarray:

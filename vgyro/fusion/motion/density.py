@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.motion.models import SpectralLine
 
 Values = Mapping[str, np.ndarray]
@@ -29,7 +30,7 @@ class DensityFamily:
     density: Callable[[Values, np.ndarray, float], np.ndarray]
 
 
-def _images(one: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def _images(one: Callable[[Floats], Floats], frequency: Floats, rate_hz: float) -> Floats:
     places = (frequency, rate_hz - frequency, rate_hz + frequency)
     return one(places[0]) + one(places[1]) + one(places[2])
 
@@ -39,41 +40,43 @@ def _walk(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
 
 
 def _driven(order: int) -> Callable[[Values, np.ndarray, float], np.ndarray]:
-    def density(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+    def density(values: Values, frequency: Floats, rate_hz: float) -> Floats:
         return values["q"] * _images(lambda f: (2.0 * math.pi * f) ** (-2 * order), frequency, rate_hz)
 
     return density
 
 
-def _markov(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def _markov(values: Values, frequency: Floats, rate_hz: float) -> Floats:
     steps = 1.0 / (rate_hz * values["tau_s"])
     keep = np.exp(-steps)
     power = -np.expm1(-2.0 * steps) * values["sd"] ** 2 / rate_hz
-    return power / ((1.0 - keep) ** 2 + 4.0 * keep * np.sin(math.pi * frequency / rate_hz) ** 2)
+    density: Floats = power / ((1.0 - keep) ** 2 + 4.0 * keep * np.sin(math.pi * frequency / rate_hz) ** 2)
+    return density
 
 
-def _section(own: np.ndarray, damping: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+def _section(own: Floats, damping: Floats, frequency: Floats) -> Floats:
     square = (frequency / own) ** 2
     return 1.0 / ((1.0 - square) ** 2 + 4.0 * damping**2 * square)
 
 
-def _resonance(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def _resonance(values: Values, frequency: Floats, rate_hz: float) -> Floats:
     own, damping = values["frequency_hz"], values["damping"]
     lowest = values["sd"] ** 2 * 4.0 * damping / (2.0 * math.pi * own)
     return lowest * _images(lambda f: _section(own, damping, f), frequency, rate_hz)
 
 
-def _oscillator(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
-    return _resonance(values, frequency, rate_hz) + _walk(values, frequency, rate_hz)
+def _oscillator(values: Values, frequency: Floats, rate_hz: float) -> Floats:
+    density: Floats = _resonance(values, frequency, rate_hz) + _walk(values, frequency, rate_hz)
+    return density
 
 
-def _pair(values: Values, frequency: np.ndarray, rate_hz: float) -> np.ndarray:
+def _pair(values: Values, frequency: Floats, rate_hz: float) -> Floats:
     own, damping, second, loss = (values[name] for name in PAIR[:-1])
     lowest = values["sd"] ** 2 / pair_power(own, damping, second, loss)
     return lowest * _images(lambda f: _section(own, damping, f) * _section(second, loss, f), frequency, rate_hz)
 
 
-def pair_power(own: np.ndarray, damping: np.ndarray, second: np.ndarray, loss: np.ndarray) -> np.ndarray:
+def pair_power(own: Floats, damping: Floats, second: Floats, loss: Floats) -> Floats:
     """∫ of the product of both sections over all frequencies, Hz.
 
     James, Nichols & Phillips (1947), Theory of Servomechanisms, appendix: the integral of four poles.
@@ -83,7 +86,8 @@ def pair_power(own: np.ndarray, damping: np.ndarray, second: np.ndarray, loss: n
     b = first**2 + other**2 + 4.0 * damping * loss * first * other
     c = 2.0 * first * other * (damping * other + loss * first)
     d = (first * other) ** 2
-    return d * (a * b - c) / (2.0 * (a * b * c - c**2 - a**2 * d))
+    power: Floats = d * (a * b - c) / (2.0 * (a * b * c - c**2 - a**2 * d))
+    return power
 
 
 PAIR = ("frequency_hz", "damping", "second_hz", "second_damping", "sd")

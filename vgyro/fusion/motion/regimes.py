@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.errors import DataError
 from vgyro.fusion.motion.models import Activity, Dynamics, Motion
 
@@ -110,7 +111,7 @@ def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -
     return F, Q
 
 
-def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np.ndarray:
+def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> Floats:
     """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
 
     With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero;
@@ -127,4 +128,5 @@ def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np
         factors = np.array([2.0, 3.0, 2.0]) if motion.model == "jerk" else np.full(2, math.sqrt(2.0))
     w = (q / density) ** (1.0 / (6.0 if motion.model == "jerk" else 4.0))
     order = dynamics.order
-    return density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)
+    known: Floats = density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)
+    return known

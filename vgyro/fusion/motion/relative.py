@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.events import excluded
 from vgyro.fusion.noise.quiet_frequencies import quiet_noise
 from vgyro.fusion.types import ArrayRates
@@ -153,7 +154,7 @@ def _shares(array: ArrayRates, good: np.ndarray) -> tuple[np.ndarray, float]:
     return shares, float(shares @ covariance @ shares)
 
 
-def _white(array: ArrayRates, good: np.ndarray) -> np.ndarray:
+def _white(array: ArrayRates, good: Bools) -> Floats:
     """Variances of the gyros' white noise [N], from the steps of neighbouring samples about the mean of all.
 
     a_i = σ_i²·(1 - 2/N) + Σσ²/N². None below LEAST of the median; two gyros have the same.
@@ -173,7 +174,8 @@ def _white(array: ArrayRates, good: np.ndarray) -> np.ndarray:
     if gyros == 2 or total == 0.0:
         return np.full(gyros, total / gyros or 1.0)
     found = (seen - total / gyros**2) / (1.0 - 2.0 / gyros)
-    return np.maximum(found, LEAST * max(float(np.median(found)), total * 1e-6))
+    white: Floats = np.maximum(found, LEAST * max(float(np.median(found)), total * 1e-6))
+    return white
 
 
 def smoothing_window(array: ArrayRates, mean: np.ndarray, noise: float) -> int | None:
@@ -321,7 +323,7 @@ def without_relative(array: ArrayRates) -> tuple[ArrayRates, Relative | None, st
     return replace(array, rate=rate), found, found.note
 
 
-def relative_variance(array: ArrayRates, found: Relative, weights: np.ndarray, delay_sd: float) -> np.ndarray:
+def relative_variance(array: ArrayRates, found: Relative, weights: Floats, delay_sd: float) -> Floats:
     """Variance [T], (deg/s)², of what the answers leave in Σu·y: of their errors, and of what all gyros share.
 
     weights : [N], Σ = 1;  delay_sd : of the delay that all share where it is known, s; NaN: as their spread has it
@@ -330,4 +332,5 @@ def relative_variance(array: ArrayRates, found: Relative, weights: np.ndarray, d
     if math.isfinite(delay_sd):
         common[1] = delay_sd**2
     sizes = common + np.einsum("i,kij,j->k", weights, found.covariance, weights)
-    return np.square(terms) @ sizes
+    variance: Floats = np.square(terms) @ sizes
+    return variance

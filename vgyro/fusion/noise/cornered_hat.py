@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.noise.difference_blocks import BlockMoments
 
 ROUNDS = 200
@@ -50,10 +51,11 @@ def cornered_hat(pairs: np.ndarray) -> np.ndarray:
     return scale * np.asarray(nnls(design, pairs[first, second] / scale)[0])
 
 
-def pair_variances(square: np.ndarray) -> np.ndarray:
+def pair_variances(square: Floats) -> Floats:
     """Mean squares [..., N, N] of the differences y_i - y_j from second moments `square` [..., N, N] of y."""
     own = np.einsum("...ii->...i", square)
-    return own[..., :, None] + own[..., None, :] - 2.0 * square
+    variances: Floats = own[..., :, None] + own[..., None, :] - 2.0 * square
+    return variances
 
 
 @dataclass(frozen=True)
@@ -108,17 +110,18 @@ def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[
     return variance, outlier
 
 
-def outliers(square: np.ndarray) -> np.ndarray:
+def outliers(square: Floats) -> Bools:
     """Single blocks far above all of their neighbours and the mean: [M, N] of squares [M, N]; zero: not known."""
     around = np.zeros_like(square)
     for shift in range(1, NEIGHBOURS + 1):
         around[shift:] = np.maximum(around[shift:], square[:-shift])
         around[:-shift] = np.maximum(around[:-shift], square[shift:])
     mean = square.sum(axis=0) / np.maximum((square > 0).sum(axis=0), 1)
-    return (around > 0) & (square > FAR * around) & (square > FAR_FROM_MEAN * mean)
+    far: Bools = (around > 0) & (square > FAR * around) & (square > FAR_FROM_MEAN * mean)
+    return far
 
 
-def _without_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
+def _without_slow(moments: BlockMoments, used: Bools) -> Floats:
     """Second moments [M, N, N] a sample of the differences less their slow part, without bias for constant variances.
 
     used [M] : the blocks that the slow part is the mean of

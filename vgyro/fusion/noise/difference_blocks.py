@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
 from vgyro.fusion.samples.missing import away
@@ -51,18 +52,20 @@ class BlockMoments:
     excluded: np.ndarray
 
     @property
-    def size(self) -> np.ndarray:
+    def size(self) -> Ints:
         """Samples of each block [M]."""
-        return self.stop - self.start
+        size: Ints = self.stop - self.start
+        return size
 
     def part(self, blocks: np.ndarray) -> BlockMoments:
         """Some of the blocks, by number; their windows are still those of all."""
         return BlockMoments(*(getattr(self, one.name)[blocks] for one in fields(self)))
 
-    def window_sum(self, values: np.ndarray) -> np.ndarray:
+    def window_sum(self, values: Floats | Ints) -> Floats:
         """Sums of values [M, ...] over the window about each block."""
         total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
-        return total[self.high + 1] - total[self.low]
+        sums: Floats = total[self.high + 1] - total[self.low]
+        return sums
 
     def residual(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean squares, (deg/s)², and means, deg/s, [M, N] of y - 1·u'y in each block, for u [M, N] with Σu = 1."""

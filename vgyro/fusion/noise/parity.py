@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.blocks import PIECE, SampleWeights
 from vgyro.fusion.noise.ar1 import colour
 from vgyro.fusion.noise.changing import changing_variances
@@ -68,12 +69,14 @@ class Variances:
     @property
     def gyros(self) -> int:
         """N."""
-        return self.variance.shape[1]
+        gyros: int = self.variance.shape[1]
+        return gyros
 
     @property
-    def shares(self) -> np.ndarray:
+    def shares(self) -> Ints:
         """Samples of each block [M]."""
-        return self.stop - self.start
+        shares: Ints = self.stop - self.start
+        return shares
 
     def weights(self, engine: str = "native") -> np.ndarray:
         """Minimum-variance weights [M, N] of R_t = σσ'∘C: Σ = 1, 0 where excluded; equal if all are.
@@ -135,26 +138,30 @@ class Variances:
         """The weights of the samples."""
         return SampleWeights.of(self.weights(engine), self.block_of_sample())
 
-    def combined_variance(self, weights: np.ndarray | None = None) -> np.ndarray:
+    def combined_variance(self, weights: Floats | None = None) -> Floats:
         """u'Ru [M], (deg/s)², of one sample of the combination; weights u [M, N], None: those of least variance."""
         weights = self.weights() if weights is None else weights
         if self.added is not None:
             own = weights * np.sqrt(np.maximum(self.variance - self.added[:, None], 0.0))
-            return np.sum((own @ self.correlation) * own, axis=1) + self.added * np.sum(weights**2, axis=-1)
+            variance: Floats = np.sum((own @ self.correlation) * own, axis=1) + self.added * np.sum(weights**2, axis=-1)
+            return variance
         parts = weights * np.sqrt(self.variance)
         if self.moving is not None:
-            return np.einsum("bi,bij,bj->b", parts, self.moving, parts)
-        return np.sum((parts @ self.correlation) * parts, axis=1)
+            variance = np.einsum("bi,bij,bj->b", parts, self.moving, parts)
+            return variance
+        variance = np.sum((parts @ self.correlation) * parts, axis=1)
+        return variance
 
     def colour(self, weights: np.ndarray | None = None) -> float:
         """φ of the combination: mean of the gyros', by their shares u_i²σ_i² of its variance."""
         return float(self._parts(weights) @ self.phi)
 
-    def _parts(self, weights: np.ndarray | None) -> np.ndarray:
+    def _parts(self, weights: Floats | None) -> Floats:
         """Shares [N] of the gyros in the variance of the combination, of Σ = 1, correlations left out."""
         parts = (self.weights() if weights is None else weights) ** 2 * self.variance
         share = (parts / parts.sum(axis=1, keepdims=True) * self.shares[:, None]).sum(axis=0)
-        return share / share.sum()
+        shares: Floats = share / share.sum()
+        return shares
 
 
 def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: bool = True) -> Variances:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.estimate import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.blocks import SampleWeights
@@ -75,9 +76,9 @@ class Analysed:
         shares = self.variances.shares @ weights / len(self.array.rate)
         return relative_variance(self.array, self.relative, shares, self.late_sd)
 
-    def at_samples(self, variance: np.ndarray) -> np.ndarray:
+    def at_samples(self, variance: Floats) -> Floats:
         """Variances [M] of the blocks at the samples [T]; infinite where no gyro says anything."""
-        found = variance[self.variances.block_of_sample()]
+        found: Floats = variance[self.variances.block_of_sample()]
         lost = unseen(self.array)
         if lost is not None:
             found[lost] = np.inf

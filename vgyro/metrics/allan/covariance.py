@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats
 from vgyro.errors import TooShort
 from vgyro.metrics.allan.deviation import LEAST_USED, LONGEST_TAU, averaging_factors
 from vgyro.metrics.allan.noise_type import noise_exponents
@@ -111,10 +112,12 @@ def _covariance(sums: SlotSums, factor: int) -> tuple[np.ndarray, float]:
     return d.T @ d / (2 * max(number, 1)), number / max(possible, 1)
 
 
-def _correlation(covariance: np.ndarray) -> np.ndarray:
+def _correlation(covariance: Floats) -> Floats:
     deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     scale = deviation[:, :, None] * deviation[:, None, :]
-    correlation = np.clip(np.divide(covariance, scale, where=scale > 0, out=np.full(scale.shape, math.nan)), -1, 1)
+    correlation: Floats = np.clip(
+        np.divide(covariance, scale, where=scale > 0, out=np.full(scale.shape, math.nan)), -1, 1
+    )
     places = np.arange(covariance.shape[1])
     correlation[:, places, places] = np.where(deviation > 0, 1.0, math.nan)
     return correlation

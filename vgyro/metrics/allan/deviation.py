@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats, Ints
+from vgyro.engine.protocols.noise import Allan
 from vgyro.errors import TooShort
 from vgyro.metrics.allan.noise_type import noise_exponents
 from vgyro.metrics.allan.robust import robust_differences, robust_edf, without_far_off
@@ -120,7 +121,7 @@ def allan_deviation(
 
 
 def _series(
-    rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: ModuleType, kind: str
+    rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: Allan, kind: str
 ) -> _CurveSeries:
     if sampling is None:
         return _CurveSeries(rate, edges_of(len(rate), segment))
@@ -132,9 +133,7 @@ def _series(
     return _CurveSeries(rate, edges, SlotSums.of(rate, slot, edges, allan))
 
 
-def _variances(
-    series: _CurveSeries, factors: np.ndarray, allan: ModuleType, kind: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _variances(series: _CurveSeries, factors: np.ndarray, allan: Allan, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Variance at each factor, and the share of the differences there are."""
     sums, share = series.sums, LONGEST[kind]
     if sums is None:
@@ -150,9 +149,7 @@ def _variances(
     return np.maximum(squares / some - single * excess / some, 0.0), counts / np.maximum(possible, 1)
 
 
-def _freedom(
-    series: _CurveSeries, factors: np.ndarray, exponent: np.ndarray, share: np.ndarray, allan: ModuleType, kind: str
-) -> np.ndarray:
+def _freedom(series: _CurveSeries, factors: Ints, exponent: Floats, share: Floats, allan: Allan, kind: str) -> Floats:
     """Degrees of freedom [M]: those of all stretches that are long enough, times the share of the differences."""
     lengths, alike = np.unique(np.diff(series.edges), return_counts=True)
     estimator = "overlapping" if kind == "robust" else kind

@@ -98,14 +98,14 @@ def find_tones(spectrum: Spectrum, confidence: float = 0.95, false_alarm: float 
     return sorted([*kept, *wide], key=lambda tone: tone.frequency)
 
 
-def share_tones(tones: Mapping[str, Sequence[Tone]]) -> dict[str, list]:
+def share_tones(tones: Mapping[str, Sequence[Tone]]) -> dict[str, list[str | float]]:
     """Columns of tones.parquet: the lines of every gyro, and which gyros have the same line.
 
     tones   : gyro → its lines
     returns : column → values, one row a gyro and line; `shared` names all gyros with a line no further off than the
               resolution, this gyro among them, in the order of `tones`
     """
-    columns: dict[str, list] = {
+    columns: dict[str, list[str | float]] = {
         name: [] for name in ("gyro", "frequency", "amplitude", "low", "high", "probability", "shared")
     }
     for gyro, lines in tones.items():

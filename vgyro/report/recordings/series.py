@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from markupsafe import Markup
 
@@ -86,7 +88,7 @@ def correlation_table(recording: RecordingPart, array: ArrayPart) -> Markup:
     return render_table(columns, rows, caption, compact=True)
 
 
-def _correlation_cell(row: dict | None, diagonal: bool) -> Cell:
+def _correlation_cell(row: dict[str, Any] | None, diagonal: bool) -> Cell:
     if row is None or not np.isfinite(row["correlation"]):
         return Cell("—", tone="muted", hint="a gyro whose output does not vary has no correlation")
     value, low, high = float(row["correlation"]), float(row["low"]), float(row["high"])

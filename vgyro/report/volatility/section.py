@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -75,7 +76,7 @@ def _arch_rows(table: Table) -> list[list[Cell]]:
     return rows
 
 
-def _arch_cells(row: dict | None) -> list[Cell]:
+def _arch_cells(row: dict[str, Any] | None) -> list[Cell]:
     if row is None or row["status"] != "ok":
         why = "not tested" if row is None else str(row["status"])
         return [Cell(MISSING, tone="muted", hint=why)] * 3

@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.storage.clocks.windows import (
     SHORT_STEPS,
     forward_min,
@@ -232,7 +233,7 @@ def _time_from(
     return "envelope", "far off an even grid for a while, but not for good: stamps are arrival times"
 
 
-def _blocks(times: np.ndarray, period: float, width: int) -> np.ndarray:
+def _blocks(times: Floats, period: float, width: int) -> Floats:
     """[n / width, width]: distance from a line of that period, block by block."""
     rest = times - period * np.arange(len(times))
     width = max(1, min(width, len(times)))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.storage.clocks.evenness import ENVELOPE_ROWS, Judgement, level_slope
 from vgyro.storage.clocks.windows import backward_min, forward_min
 
@@ -225,7 +226,7 @@ class _Scan:
         step = self.ahead[row : row + len(behind)] - behind
         return np.where(np.isfinite(step), step, -np.inf)
 
-    def _height(self, step: np.ndarray, row: int, hit: int) -> float:
+    def _height(self, step: Floats, row: int, hit: int) -> float:
         """The median step of the rows after it, as long as there are as many to come.
 
         The rows just before the loss, and the next loss, may spoil some: if it is not whole, shorter stretches (unless
@@ -238,7 +239,8 @@ class _Scan:
         if settle == SETTLE and len(self.ahead) - row - hit > 2 * self.reach:
             others += [step[hit + settle : hit + 2 * settle], step[hit + 2 * settle : hit + self.reach]]
         heights = [middle, *(float(np.median(part)) for part in others if len(part))]
-        return next((height for height in heights if self._weigh(height)[0]), middle)
+        whole: float = next((height for height in heights if self._weigh(height)[0]), middle)
+        return whole
 
     def _place(self, row: int, shift: float, stop: int) -> int:
         """The loss comes after the last row that is still below the new level."""

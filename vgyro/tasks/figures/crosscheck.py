@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.board import Board
 from vgyro.config import CrossCheckOptions, FusionOptions, MetricsOptions
 from vgyro.engine.independent import printed_filter, textbook_allan_deviation
@@ -66,12 +67,13 @@ def filter_rows(task: Task, gyros: list[str]) -> Iterator[CrosscheckRow]:
         yield compare(check, "filterpy, sample by sample", -1, name, ours, theirs, tolerance, "deg/s")
 
 
-def _first_samples(task: Task, gyros: list[str]) -> np.ndarray:
+def _first_samples(task: Task, gyros: list[str]) -> Floats:
     """Rates [T, N] of the beginning of the first stretch, deg/s."""
     if incomplete(task.input("rates"), gyros):
         file = read_array(task.input("rates"), gyros, task.option("axis"))
         here = file.segment[:FILTER_SAMPLES] == file.segment[0]
-        return file.rate[:FILTER_SAMPLES][here].astype(float)
+        first: Floats = file.rate[:FILTER_SAMPLES][here].astype(float)
+        return first
     found = read_rows(task.input("rates"), ["segment", *gyros], 0, FILTER_SAMPLES)
     here = found["segment"] == found["segment"][0]
     return np.column_stack([found[gyro][here] for gyro in gyros]).astype(float)

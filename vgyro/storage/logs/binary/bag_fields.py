@@ -136,4 +136,5 @@ def _then(first: Take, second: Take) -> Take:
 
 
 def _ns(stamp: Any) -> int:
-    return stamp.sec * 10**9 + stamp.nanosec
+    ns: int = stamp.sec * 10**9 + stamp.nanosec
+    return ns

@@ -69,7 +69,8 @@ def _first_row(file: Any, schema: pa.Schema) -> pa.RecordBatch | None:
 
 
 def _is_list(kind: pa.DataType) -> bool:
-    return pa.types.is_list(kind) or pa.types.is_large_list(kind)
+    lists: bool = pa.types.is_list(kind) or pa.types.is_large_list(kind)
+    return lists
 
 
 def _leaves(schema: pa.Schema, first: pa.RecordBatch | None, path: Path) -> list[ParquetLeaf]:
