@@ -10,6 +10,7 @@ import numpy as np
 from vgyro.arrays import Floats
 from vgyro.errors import DataError
 from vgyro.fusion.motion.models import Activity, Dynamics, Motion
+from vgyro.fusion.motion.noisy_rate import Standstill
 
 JUMP = 5.0
 """Means on both sides that differ by so many standard deviations: a jump."""
@@ -44,16 +45,16 @@ class Regimes:
         self,
         motion: Motion,
         dynamics: Dynamics,
-        at_rest: np.ndarray,
-        rest: Motion,
+        standstill: Standstill,
         density: float,
         jumps: np.ndarray,
         free: float,
     ) -> Regimes:
-        """At rest [T] the rate is the random walk `rest`; to the samples `jumps` it may go anywhere.
+        """In a standstill the rate is the random walk of its motion; to the samples `jumps` it may go anywhere.
 
         density : of the noise, deg²/s;  free : variance of a step that may go anywhere, (deg/s)²
         """
+        at_rest, rest = standstill
         still, slowed = _at_rest(dynamics, motion, rest, density)
         freed = slowed.copy()
         freed[0, 0] += free
@@ -74,7 +75,7 @@ def jumps_at_ends(
 ) -> np.ndarray:
     """First samples [J] after those ends of standstill at which the rate jumps.
 
-    z, r, segment, phi, at_rest : as in vgyro.fusion.motion.smoother.smooth
+    z, r, segment, phi : as in NoisyRate;  at_rest [T] : the standstill
     size : samples on both sides that are compared
     """
     ends = np.flatnonzero((np.diff(at_rest.astype(np.int8)) != 0) & (np.diff(segment) == 0)) + 1

@@ -19,6 +19,7 @@ from vgyro.fusion.bias.estimate import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.motion.lowpass import ArrayDelay, array_delay
 from vgyro.fusion.motion.models import Motion
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 from vgyro.fusion.motion.relative import Relative, relative_variance, smoothed
 from vgyro.fusion.motion.shared import shared_lines
 from vgyro.fusion.motion.smoother import choose_motion
@@ -94,6 +95,11 @@ class Analysed:
         least = lasting_of_mean(known, usual, self.slow.bias.mean(axis=0), shares @ weights)
         return np.where(self.array.at_rest, np.maximum(variance, least), variance)
 
+    def noisy_rate(self) -> NoisyRate:
+        """The best fused rate, with its variance."""
+        array = self.array
+        return NoisyRate(self.rate(), self.variance(), array.segment, array.rate_hz, self.variances.colour())
+
     def bridged(self, rate: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A rate and its variance [T] as a smoother takes them: with what is likely where no gyro says anything."""
         return (rate, variance) if self.guess is None else self.guess.put(rate, variance)
@@ -113,11 +119,10 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
         lost = unseen(known.array)
         if lost is not None:
             moving = ~lost if moving is None else moving & ~lost
+        shared = shared_lines(known.array.rate, array.segment, array.rate_hz)
         return choose_motion(
-            known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
-            parameters.motion_models, parameters.engine, moving,
-            shared_lines(known.array.rate, array.segment, array.rate_hz), parameters.has("lines"),
-        )  # fmt: skip
+            known.noisy_rate(), parameters.motion_models, parameters.engine, moving, shared, parameters.has("lines")
+        )
 
     return array.once(("motion", parameters), choose)
 
