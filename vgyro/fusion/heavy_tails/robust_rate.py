@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,6 +65,13 @@ class RateSetting:
     centre: int
     size: int
     reach: int = 0
+
+
+class Estimate(NamedTuple):
+    """Mean [n] and variance [n] of a rate, deg/s and (deg/s)²."""
+
+    mean: np.ndarray
+    variance: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -136,7 +144,7 @@ def improved(look: RateSamples, setting: RateSetting, local: Local) -> Local:
     rate, variance = _with_neighbours(look, alone, own, setting, local)
     known = np.where(seen, variance, 0.0)
     parts = [
-        _of_gyro(gyro, look, setting, precision[gyro], rate, known * look.used[gyro], local.size[gyro])
+        _of_gyro(gyro, look, setting, precision[gyro], Estimate(rate, known), local.size[gyro])
         for gyro in range(len(look.values))
     ]
     centre, size, residual = (np.stack(one) for one in zip(*parts, strict=True))
@@ -156,11 +164,10 @@ def _precision(
 
 
 def _of_gyro(
-    gyro: int, look: RateSamples, setting: RateSetting, precision: np.ndarray, rate: np.ndarray, known: np.ndarray,
-    before: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """m, s and y - m - ŵ [n] of one gyro from its precisions;  known : v [n] where it is used;  before : s so far"""
-    off = look.values[gyro] - rate
+    gyro: int, look: RateSamples, setting: RateSetting, precision: np.ndarray, rate: Estimate, before: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """m, s and y - m - ŵ [n] of one gyro from its precisions;  rate : ŵ, and v where it is known;  before : s so far"""
+    off, known = look.values[gyro] - rate.mean, rate.variance * look.used[gyro]
     mass = box(precision, setting.centre)
     enough = mass > 1e-9 * float(precision.max(initial=0.0))
     centre = np.where(enough, box(precision * off, setting.centre) / np.where(enough, mass, 1.0), setting.offset[gyro])
@@ -191,22 +198,21 @@ def _with_neighbours(
         return alone, own
     predicted = _predicted(alone, own, reach)
     extra = _extra(predicted - alone, own, setting.size)
-    jumped = _jumped(look, predicted - alone, predicted, extra, own, setting, before)
+    jumped = _jumped(look, predicted - alone, Estimate(predicted, extra), own, setting, before)
     extra[jumped | _near(look.borders, len(alone), reach)] = NOTHING * _usual(own)
     variance = 1.0 / (1.0 / own + 1.0 / extra)
     return variance * (alone / own + predicted / extra), variance
 
 
 def _jumped(
-    look: RateSamples, off: np.ndarray, predicted: np.ndarray, extra: np.ndarray, own: np.ndarray, setting: RateSetting,
-    before: Local,
-) -> np.ndarray:  # fmt: skip
+    look: RateSamples, off: np.ndarray, others: Estimate, own: np.ndarray, setting: RateSetting, before: Local
+) -> np.ndarray:
     """Samples [n] at which the gyros together are FAR from what the others predict;  off : how far they seem to be.
 
     What they say together is asked for without the prediction. Where they do not agree they say little, and no jump is
     seen.
     """
-    jumped = np.zeros(len(off), dtype=bool)
+    jumped, (predicted, extra) = np.zeros(len(off), dtype=bool), others
     places = np.flatnonzero(off**2 > 0.25 * FAR * (_usual(own) + extra))
     if places.size:
         some = RateSamples(look.values[:, places], look.used[:, places], np.empty(0, dtype=np.int64))

@@ -11,6 +11,7 @@ A common term of all gyros, R + c·11', is in no difference: only the part of C 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -93,8 +94,15 @@ def patterns(excluded: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(np.zeros_like(pattern) if pattern.all() else pattern, rows) for pattern, rows in found]
 
 
-def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variances [N] a sample, (deg/s)², that hold for the whole recording, and the outlying blocks [M, N].
+class ConstantVariances(NamedTuple):
+    """Variances [N] a sample, (deg/s)², that hold for the whole recording, and the outlying blocks [M, N]."""
+
+    variance: np.ndarray
+    outlier: np.ndarray
+
+
+def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> ConstantVariances:
+    """The gyros' variances if they do not change.
 
     The slow part (drift, bias) is left out, and so are the blocks that are excluded, or where one gyro is an outlier.
     """
@@ -107,7 +115,7 @@ def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[
         if not outlier.any():
             break
         variance = _solve(moments, np.logical_not(outlier.any(axis=1)), correlation)
-    return variance, outlier
+    return ConstantVariances(variance, outlier)
 
 
 def outliers(square: Floats) -> Bools:

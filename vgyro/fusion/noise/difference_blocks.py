@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,7 +82,8 @@ def block_moments(array: ArrayRates, size: int | None = None, own: bool = False)
 
     own : of the rates themselves, each less its mean over the recording, in place of the differences
     """
-    start, stop, low, high = _edges(array, block_size(array.rate_hz) if size is None else size)
+    edges = _edges(array, block_size(array.rate_hz) if size is None else size)
+    start, stop = edges.start, edges.stop
     gyros = array.rate.shape[1]
     level = np.array([column.mean(dtype=float) for column in array.rate.T])[:, None] if own else None
     square = np.empty((len(start), gyros, gyros))
@@ -101,7 +103,7 @@ def block_moments(array: ArrayRates, size: int | None = None, own: bool = False)
     _mark(bad, start, stop, excluded(array.faults, len(array.rate), gyros))
     if array.missing is not None:
         _mark(bad, start, stop, [away(column, block_size(array.rate_hz)) for column in array.missing.T])
-    return BlockMoments(start, stop, low, high, square, mean, bad)
+    return BlockMoments(*edges, square, mean, bad)
 
 
 def block_size(rate_hz: float) -> int:
@@ -109,8 +111,17 @@ def block_size(rate_hz: float) -> int:
     return 1 if rate_hz < SINGLE_BELOW_HZ else max(FEWEST_SAMPLES, round(BLOCK_S * rate_hz))
 
 
-def _edges(array: ArrayRates, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """start, stop, low, high of the blocks; what is left over in a stretch is of its last block."""
+class _Edges(NamedTuple):
+    """As in BlockMoments."""
+
+    start: np.ndarray
+    stop: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def _edges(array: ArrayRates, size: int) -> _Edges:
+    """Edges of the blocks; what is left over in a stretch is of its last block."""
     starts, stops, lows, highs, number = [], [], [], [], 0
     for part in array.stretches():
         count = max(1, (part.stop - part.start) // size)
@@ -121,8 +132,7 @@ def _edges(array: ArrayRates, size: int) -> tuple[np.ndarray, np.ndarray, np.nda
         lows.append(np.maximum(place - SLOW_BLOCKS, number))
         highs.append(np.minimum(place + SLOW_BLOCKS, number + count - 1))
         number += count
-    start, stop, low, high = (np.concatenate(one) for one in (starts, stops, lows, highs))
-    return start, stop, low, high
+    return _Edges(*(np.concatenate(one) for one in (starts, stops, lows, highs)))
 
 
 def _pieces(start: np.ndarray, stop: np.ndarray) -> Iterator[slice]:

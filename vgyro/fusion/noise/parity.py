@@ -19,7 +19,13 @@ from vgyro.fusion.noise.ar1 import colour
 from vgyro.fusion.noise.changing import changing_variances
 from vgyro.fusion.noise.changing_at_rest import Resting, resting_noise
 from vgyro.fusion.noise.changing_in_motion import alike, compared, moving_noise
-from vgyro.fusion.noise.cornered_hat import best_weights, constant_variances, patterns, scaled_to_pairs
+from vgyro.fusion.noise.cornered_hat import (
+    ConstantVariances,
+    best_weights,
+    constant_variances,
+    patterns,
+    scaled_to_pairs,
+)
 from vgyro.fusion.noise.cornered_hat import cornered_hat as cornered_hat
 from vgyro.fusion.noise.cornered_hat import pair_variances as pair_variances
 from vgyro.fusion.noise.difference_blocks import BlockMoments, block_moments
@@ -198,7 +204,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     memories = [CONSTANT] * gyros
     moving, changing = None, changing and parameters.has("changing")
     if changing:
-        found = _changing(array, moments, constant, outlier, correlation, parameters, motion is None)
+        found = _changing(array, moments, ConstantVariances(constant, outlier), correlation, parameters, motion is None)
         variance, memories, correlation, moving = found.variance, found.memories, found.correlation, found.moving
     tau = np.array([memory.tau_s for memory in memories])
     if motion is not None:
@@ -216,10 +222,15 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
 
 
 def _changing(
-    array: ArrayRates, moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray,
-    parameters: FilterParameters, together: bool = True,
-) -> Resting:  # fmt: skip
+    array: ArrayRates,
+    moments: BlockMoments,
+    known: ConstantVariances,
+    correlation: np.ndarray,
+    parameters: FilterParameters,
+    together: bool = True,
+) -> Resting:
     """Variances that change, and the correlation, if that changes as well and may."""
+    constant, outlier = known
     engine, together = parameters.engine, together and parameters.has("changing_correlation")
     block_s = float(np.median(moments.size)) / array.rate_hz
     if array.at_rest.all():
