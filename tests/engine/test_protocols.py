@@ -16,15 +16,15 @@ from vgyro.engine.native import MODULES
 from vgyro.engine.protocols import engines, filters, noise, reading, volatility
 
 PROTOCOLS = {
-    "adaptive": filters.Adaptive,
-    "allan": noise.Allan,
-    "dcc": volatility.Dcc,
-    "frames": reading.Frames,
-    "garch": volatility.Garch,
-    "kalman": filters.Kalman,
-    "statespace": filters.StateSpaces,
-    "text": reading.Text,
-    "weights": volatility.Weights,
+    "adaptive": filters.AdaptiveEngine,
+    "allan": noise.AllanEngine,
+    "dcc": volatility.DccEngine,
+    "frames": reading.FramesEngine,
+    "garch": volatility.GarchEngine,
+    "kalman": filters.KalmanEngine,
+    "statespace": filters.StateSpaceEngine,
+    "text": reading.TextEngine,
+    "weights": volatility.WeightsEngine,
 }
 METHODS = {("frames", "Finder"): reading.FrameFinder, ("text", "Parser"): reading.LineParser}
 FUNCTIONS = [
@@ -85,9 +85,9 @@ smoothed = engine.get("native").kalman.low_pass(np.ones(3), 0.5, 0.5, start=0.0)
 WRONG = """
 import numpy as np
 from vgyro import engine
-from vgyro.engine.protocols.noise import Allan
+from vgyro.engine.protocols.noise import AllanEngine
 
-def measure(allan: Allan) -> float:
+def measure(allan: AllanEngine) -> float:
     return allan.limits(np.ones(3), np.ones(3))  # confidence is missing, and two are returned
 engine.get("native").garch.fit_garch(np.ones((30, 1)), 3)
 engine.get("native").kalman.low_pass(np.ones(3), "0.5", 0.5, 0.0)
@@ -99,10 +99,10 @@ WRONG_ENGINE = """
 import numpy as np
 from vgyro.engine.models import GarchFit
 from vgyro.engine.native import garch, dcc
-from vgyro.engine.protocols.volatility import Dcc, Garch
+from vgyro.engine.protocols.volatility import DccEngine, GarchEngine
 
-right: Garch = garch
-wrong: Garch = dcc
+right: GarchEngine = garch
+wrong: GarchEngine = dcc
 """
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vgyro.arrays import Bools, Floats
+from vgyro.engine.models import DccModel
 from vgyro.engine.recursions import dcc_correlation, garch_variance
 
 SINGULAR = 1e-12
@@ -13,28 +14,19 @@ ASYMMETRY = 1e-9
 """Largest difference of a correlation from its transpose that is still rounding."""
 
 
-def conditional_covariance(
-    r: np.ndarray,
-    inside: int,
-    omega: np.ndarray,
-    alpha: np.ndarray,
-    beta: np.ndarray,
-    a: float,
-    b: float,
-    target: np.ndarray,
-) -> np.ndarray:
+def conditional_covariance(r: np.ndarray, inside: int, model: DccModel) -> np.ndarray:
     """H_t over a window and beyond it.
 
-    r                  : [L, N] deg/s, the window's `inside` samples and those after it; leading rows with a value that
-                         is not finite take the first H
-    omega, alpha, beta : [N], ω in (deg/s)²
-    a, b, target       : DCC, S [N, N]; a = 0 is a constant correlation
-    returns            : [L, N, N] (deg/s)²
+    r       : [L, N] deg/s, the window's `inside` samples and those after it; leading rows with a value that is not
+              finite take the first H
+    model   : of the window; a = 0 is a constant correlation
+    returns : [L, N, N] (deg/s)²
     The start (mean(e²), Q_1 = S) is the window's own: H_t beyond it uses r up to t - 1, nothing later.
     Liu et al. (2015), eq. 1-6.
     """
     first = int(np.argmax(np.all(np.isfinite(r), axis=1)))
     e = r[first:]
+    omega, alpha, beta, a, b, target = model
     start = omega + (alpha + beta) * np.mean(np.square(e[: inside - first]), axis=0)
     deviation = np.sqrt(garch_variance(e, omega, alpha, beta, start))
     correlation = target if a == 0 else dcc_correlation(e / deviation, a, b, target)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -147,6 +147,15 @@ def bekk_log_likelihood(r: np.ndarray, covariance: np.ndarray) -> float:
     return -0.5 * float(r.size * math.log(2 * math.pi) + log_det + np.square(white).sum())
 
 
+class _Slopes(NamedTuple):
+    """Cost, and its slopes in Ω [N, N], a [N] and b [N], Ω held fixed for the last two."""
+
+    cost: float
+    constant: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+
+
 @dataclass(frozen=True)
 class _Point:
     """Parameters, in units of each gyro's r.m.s.: Ω = DLL'D with D = diag √(1 - a² - b²).
@@ -184,8 +193,8 @@ class _Likelihood:
     def cost(self, point: _Point) -> float:
         return -bekk_log_likelihood(self.e, self.covariance(point)) / len(self.e)
 
-    def slopes(self, point: _Point) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Cost, and its slopes in Ω [N, N], a [N] and b [N], Ω held fixed for the last two."""
+    def slopes(self, point: _Point) -> _Slopes:
+        """The cost and its slopes."""
         samples, n = self.e.shape
         path = self._path(point)
         H = _full(path, n)
@@ -201,7 +210,7 @@ class _Likelihood:
             2 * _symmetric((felt * values).sum(axis=0), n) @ weight
             for values, weight in ((self._products, point.a), (before, point.b))
         )
-        return cost, _symmetric(felt.sum(axis=0), n), by_a, by_b
+        return _Slopes(cost, _symmetric(felt.sum(axis=0), n), by_a, by_b)
 
     def _path(self, point: _Point) -> np.ndarray:
         """H_t above and on the diagonal, [T, N(N+1)/2]."""

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from vgyro.arrays import Floats
+from vgyro.engine.models import DccModel
 
 PERSISTENCE_MAX = 1.0 - 1e-6
 GRID_ALPHA = (0.0, 0.005, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32, 0.45, 0.65, 0.9)
@@ -74,16 +75,14 @@ def _log_likelihood(e: Floats, points: Floats) -> Floats:
     return likelihood
 
 
-def covariance_after(
-    r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, a: float, b: float, target: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def covariance_after(r: np.ndarray, model: DccModel) -> tuple[np.ndarray, np.ndarray]:
     """H of the last sample of a window and of the one after it, by the recursions written as loops.
 
-    r                  : array [T, N], deg/s, the window
-    omega, alpha, beta : [N];  a, b : DCC, 0 for CCC;  target : S [N, N]
-    returns            : H_T and H_{T+1} [N, N], (deg/s)²
+    r       : array [T, N], deg/s, the window
+    returns : H_T and H_{T+1} [N, N], (deg/s)²
     Liu et al. (2015), eq. 1-6, with h_0 = e_0² = mean(e²) and Q_1 = S.
     """
+    omega, alpha, beta, a, b, target = model
     h = omega + (alpha + beta) * np.mean(r**2, axis=0)
     Q = target.copy()
     for row in r:

@@ -7,6 +7,7 @@ members of the second.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,7 @@ def scale_bias_filter(
     state: np.ndarray,
     covariance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Adaptive.scale_bias_filter.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.scale_bias_filter.
 
     The sums are kept at zero by an orthonormal basis B, b = Bβ and s = Bσ, so the filter has 2N states. The readings
     are made independent once, by the Cholesky factor of `noise` (rows of H are mixed alike), and are then used one
@@ -61,7 +62,7 @@ def filter_bank(
     probability: np.ndarray,
     least: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Adaptive.filter_bank.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.filter_bank.
 
     With D = 1'R⁻¹1 and u = R⁻¹1/D, Sherman & Morrison (1950) gives S⁻¹ and |S| of S = R + 1·P·1':
     e'S⁻¹e = y'(R⁻¹ - R⁻¹11'R⁻¹/D)y + (u'y - x)²/(P + 1/D),  |S| = |R|·(1 + P·D).
@@ -93,14 +94,23 @@ def _zero_sum_basis(gyros: int) -> np.ndarray:
     return basis
 
 
-def _weighed(noise: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]:
+class _Weighed(NamedTuple):
     """Of one R: R⁻¹1/1'R⁻¹1 without its first [N-1], what makes y_i - y_0 white [N-1, N-1], 1/1'R⁻¹1, log|R|."""
+
+    share: np.ndarray
+    parity: np.ndarray
+    noise: float
+    size: float
+
+
+def _weighed(noise: np.ndarray) -> _Weighed:
     noise = np.asarray(noise, dtype=float)
     factor = _factor(noise)
     solved = np.linalg.solve(noise, np.ones(len(noise)))
     between = noise[1:, 1:] - noise[1:, :1] - noise[:1, 1:] + noise[0, 0]
     parity = np.linalg.inv(_factor(between))
-    return (solved / solved.sum())[1:], parity, 1.0 / solved.sum(), 2.0 * float(np.log(np.diag(factor)).sum())
+    size = 2.0 * float(np.log(np.diag(factor)).sum())
+    return _Weighed((solved / solved.sum())[1:], parity, 1.0 / solved.sum(), size)
 
 
 def _factor(noise: np.ndarray) -> np.ndarray:

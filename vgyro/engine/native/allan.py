@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from vgyro.arrays import Floats, Ints
+from vgyro.engine.models import LossyDifferences
 from vgyro.engine.native import _allan, pool
 from vgyro.engine.native.allan_freedom import degrees_of_freedom, limits
 
@@ -27,7 +28,7 @@ def differences(
     share: int = 2,
     kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.differences; summed in blocks of 2048, the blocks pairwise."""
+    """As vgyro.engine.protocols.noise.AllanEngine.differences; summed in blocks of 2048, the blocks pairwise."""
     edges = _edges(rate, edges)
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     sums, counts = np.zeros(len(factors)), np.zeros(len(factors), dtype=np.int64)
@@ -63,7 +64,7 @@ def _summed(angle: Floats, edges: Ints, factors: Ints, most: Ints, share: int, k
 
 
 def slot_sums(rate: np.ndarray, slot: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.slot_sums."""
+    """As vgyro.engine.protocols.noise.AllanEngine.slot_sums."""
     edges = np.ascontiguousarray(edges, dtype=np.int64)
     borders = int(edges[-1]) + len(edges) - 1
     total, have = np.zeros(borders), np.zeros(borders, dtype=np.int32)
@@ -80,8 +81,8 @@ def differences_over_losses(
     factors: np.ndarray,
     share: int = 3,
     kind: str = "overlapping",
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.differences_over_losses; the differences begin `strides` slots apart."""
+) -> LossyDifferences:
+    """As vgyro.engine.protocols.noise.AllanEngine.differences_over_losses; those begin `strides` slots apart."""
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     edges = np.ascontiguousarray(edges, dtype=np.int64)
     steps = strides(factors)
@@ -99,7 +100,8 @@ def differences_over_losses(
     if kind == "modified":
         # White noise of m slots: the modified variance is this part of the other one.
         found[:, 1] *= (factors**2 + 1) / (2 * factors**2)
-    return found[:, 0], found[:, 1], counts, possible_differences(factors, np.diff(edges), share, kind)
+    possible = possible_differences(factors, np.diff(edges), share, kind)
+    return LossyDifferences(found[:, 0], found[:, 1], counts, possible)
 
 
 def strides(factors: Ints) -> Ints:
@@ -119,7 +121,7 @@ def possible_differences(factors: Ints, slots: Ints, share: int, kind: str) -> I
 def lag_products(
     rate: np.ndarray, factors: np.ndarray, edges: np.ndarray | None = None, fewest: int = 4
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.lag_products."""
+    """As vgyro.engine.protocols.noise.AllanEngine.lag_products."""
     edges = _edges(rate, edges)
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     squares, products = np.zeros((len(factors), 3)), np.zeros((len(factors), 3))

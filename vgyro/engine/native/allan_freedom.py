@@ -49,7 +49,7 @@ KINDS = {
 
 
 def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind: str = "overlapping") -> np.ndarray:
-    """As vgyro.engine.protocols.noise.Allan.degrees_of_freedom."""
+    """As vgyro.engine.protocols.noise.AllanEngine.degrees_of_freedom."""
     variance = KINDS[kind]
     alpha = min(max(alpha, variance.steepest), FLATTEST)
     count = variance.count(np.atleast_1d(np.asarray(samples, dtype=float)), factor)
@@ -73,7 +73,7 @@ def _white_angle(d: int) -> tuple[float, float]:
 
 
 def limits(deviation: np.ndarray, edf: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.limits."""
+    """As vgyro.engine.protocols.noise.AllanEngine.limits."""
     from scipy.special import chdtri
 
     tail = (1 - confidence) / 2

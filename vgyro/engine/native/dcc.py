@@ -38,14 +38,14 @@ STATES = np.array(
 def fit_dcc_windows(
     r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray, lags: int = 1
 ) -> DccWindows:
-    """As vgyro.engine.protocols.volatility.Dcc.fit_dcc_windows; at most 32 series."""
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc_windows; at most 32 series."""
     r = np.ascontiguousarray(r, dtype=float)
     margins = np.stack([np.asarray(part, dtype=float) for part in (omega, alpha, beta)])
     return _fit(r, margins, np.asarray(status), lags)
 
 
 def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None = None) -> DccFit:
-    """As vgyro.engine.protocols.volatility.Dcc.fit_dcc; at most 32 series."""
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc; at most 32 series."""
     z = np.ascontiguousarray(z, dtype=float)
     n = z.shape[1]
     known = np.full((1, n), garch_code(CONVERGED), dtype=np.uint8)

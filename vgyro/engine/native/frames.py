@@ -64,7 +64,7 @@ class Finder:
 def read_columns(
     buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[FrameColumn]
 ) -> list[np.ndarray]:
-    """As vgyro.engine.protocols.reading.Frames.read_columns."""
+    """As vgyro.engine.protocols.reading.FramesEngine.read_columns."""
     read = [np.empty(len(places), dtype=DTYPES[column.kind]) for column in columns]
     if not len(places):
         return read
@@ -79,7 +79,7 @@ def read_columns(
 
 
 def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int, modulus: int) -> np.ndarray:
-    """As vgyro.engine.protocols.reading.Frames.breaks."""
+    """As vgyro.engine.protocols.reading.FramesEngine.breaks."""
     rows = np.empty(len(start), dtype=np.int64)
     if len(start):
         rows = rows[: _frames.breaks(start, counter, length, step, modulus, rows)].copy()
@@ -87,7 +87,7 @@ def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int
 
 
 def longest_run(values: np.ndarray, time: np.ndarray, since: float, least: float) -> tuple[Run | None, float]:
-    """As vgyro.engine.protocols.reading.Frames.longest_run."""
+    """As vgyro.engine.protocols.reading.FramesEngine.longest_run."""
     # Only whether two integers are equal counts, not their sign.
     kind = f"i{values.itemsize}" if values.dtype.kind == "u" else values.dtype
     began, duration, last = _frames.longest_run(np.ascontiguousarray(values).view(kind), time, since, least)

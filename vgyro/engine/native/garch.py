@@ -25,7 +25,7 @@ LOG_2_PI = float(np.log(2 * np.pi))
 
 
 def fit_garch_windows(r: np.ndarray) -> GarchWindows:
-    """As vgyro.engine.protocols.volatility.Garch.fit_garch_windows; a view of overlapping windows is not copied.
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch_windows; a view of overlapping windows is not copied.
 
     A grid of 32 points (eight β, four α each, ω = 1 - α - β) and one step of scoring from the constant variance at
     each β show where searches begin: at the local optima along β. At eight more β the best trend of the variance with
@@ -55,7 +55,7 @@ def fit_garch_windows(r: np.ndarray) -> GarchWindows:
 
 
 def fit_garch(r: np.ndarray) -> GarchFit:
-    """As vgyro.engine.protocols.volatility.Garch.fit_garch: fit_garch_windows of one window."""
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch: fit_garch_windows of one window."""
     r = np.require(r, dtype=float, requirements="A")
     fit = fit_garch_windows(r[None])
     omega, alpha, beta = fit.omega[0], fit.alpha[0], fit.beta[0]

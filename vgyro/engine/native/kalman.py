@@ -27,7 +27,7 @@ def kalman_filter(
     start: float,
     variance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Kalman.kalman_filter.
+    """As vgyro.engine.protocols.filters.KalmanEngine.kalman_filter.
 
     P and x stay accurate for an ill-conditioned R: the common rate is taken out before R is solved for, and P = K·P⁻
     of one weighted mean has no cancellation.
@@ -59,7 +59,7 @@ def kalman_filter(
 def rts_smoother(
     estimate: np.ndarray, variance: np.ndarray, transition: float, process: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Kalman.rts_smoother."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.rts_smoother."""
     estimate, variance = np.ascontiguousarray(estimate, dtype=float), np.ascontiguousarray(variance, dtype=float)
     smoothed, spread = np.empty(len(estimate)), np.empty(len(estimate))
     if len(estimate):
@@ -72,7 +72,7 @@ def rts_smoother(
 
 
 def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, start: float) -> np.ndarray:
-    """As vgyro.engine.protocols.filters.Kalman.constant_gain_filter."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.constant_gain_filter."""
     driven = np.zeros(len(rate))
     for column, share in zip(rate.T, gain, strict=True):
         driven += np.multiply(column, share, dtype=float)
@@ -80,12 +80,12 @@ def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, 
 
 
 def low_pass(signal: np.ndarray, keep: float, gain: float, start: float) -> np.ndarray:
-    """As vgyro.engine.protocols.filters.Kalman.low_pass."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.low_pass."""
     return _run(signal, _kalman.low_pass, keep, gain, start)
 
 
 def settling_filter(signal: np.ndarray, keep: float, fading: float, start: float) -> np.ndarray:
-    """As vgyro.engine.protocols.filters.Kalman.settling_filter."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.settling_filter."""
     return _run(signal, _kalman.settling, keep, fading, start)
 
 

@@ -14,7 +14,7 @@ from vgyro.engine.native import _statespace
 def log_likelihood(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, skip: int = 0, regime: np.ndarray | None = None
 ) -> tuple[float, int]:
-    """As vgyro.engine.protocols.filters.StateSpaces.log_likelihood."""
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.log_likelihood."""
     z, r, flags, whole = checked(z, r, model, regime)
     if len(z) == 0:
         return 0.0, 0
@@ -30,7 +30,7 @@ def log_likelihood(
 def smooth(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.StateSpaces.smooth.
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.smooth.
 
     The modified Bryson-Frazier form of the Rauch-Tung-Striebel smoother (Bierman 1973, Int. J. Control 18, 1251-1258):
     it inverts nothing, so that a noise without a white part and a state that does not move are no special cases. The

@@ -14,7 +14,7 @@ WINDOWS = 64
 
 
 def min_variance_weights(H: np.ndarray) -> np.ndarray:
-    """As vgyro.engine.protocols.volatility.Weights.min_variance_weights; at most 32 gyros.
+    """As vgyro.engine.protocols.volatility.WeightsEngine.min_variance_weights; at most 32 gyros.
 
     With Hx ≥ 1, x ≥ 0, x'(Hx - 1) = 0 the weights are x/Σx. The support is found by block principal pivoting from the
     full one (Portugal, Júdice & Vicente 1994; at last by Murty's single exchanges, 1974). A search from the support of
@@ -42,7 +42,7 @@ def conditional_weights(
     begin: int,
     end: int,
 ) -> ConditionalWeights:
-    """As vgyro.engine.protocols.volatility.Weights.conditional_weights; at most 32 gyros."""
+    """As vgyro.engine.protocols.volatility.WeightsEngine.conditional_weights; at most 32 gyros."""
     omega, alpha, beta, a, b, target = (
         np.ascontiguousarray(array, dtype=float) for array in (omega, alpha, beta, a, b, target)
     )

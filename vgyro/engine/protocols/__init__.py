@@ -1,9 +1,9 @@
 """What an engine is: one Protocol for each of its modules, where each function is explained once, for both engines.
 
-volatility : Garch, Dcc and Weights
-noise      : Allan
-filters    : Kalman, StateSpaces and Adaptive
-reading    : Frames and Text
+volatility : GarchEngine, DccEngine and WeightsEngine
+noise      : AllanEngine
+filters    : KalmanEngine, StateSpaceEngine and AdaptiveEngine
+reading    : FramesEngine and TextEngine
 engines    : Engine, which has them all: what `vgyro.engine.get` returns
 
 The modules of an engine stand for these by their functions, so that a call that does not fit is an error of types. How

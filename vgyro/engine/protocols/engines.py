@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from typing import Protocol, TypeAlias
 
-from vgyro.engine.protocols.filters import Adaptive, Kalman, StateSpaces
-from vgyro.engine.protocols.noise import Allan
-from vgyro.engine.protocols.reading import Frames, Text
-from vgyro.engine.protocols.volatility import Dcc, Garch, Weights
+from vgyro.engine.protocols.filters import AdaptiveEngine, KalmanEngine, StateSpaceEngine
+from vgyro.engine.protocols.noise import AllanEngine
+from vgyro.engine.protocols.reading import FramesEngine, TextEngine
+from vgyro.engine.protocols.volatility import DccEngine, GarchEngine, WeightsEngine
 
-Modules: TypeAlias = tuple[Adaptive, Allan, Dcc, Frames, Garch, Kalman, StateSpaces, Text, Weights]
+Modules: TypeAlias = tuple[
+    AdaptiveEngine,
+    AllanEngine,
+    DccEngine,
+    FramesEngine,
+    GarchEngine,
+    KalmanEngine,
+    StateSpaceEngine,
+    TextEngine,
+    WeightsEngine,
+]
 """What each engine's package says that its modules are."""
 
 
@@ -17,37 +27,37 @@ class Engine(Protocol):
     """The modules of an engine; each is loaded when it is first asked for."""
 
     @property
-    def adaptive(self) -> Adaptive:
+    def adaptive(self) -> AdaptiveEngine:
         """Filters that adapt themselves to the array."""
 
     @property
-    def allan(self) -> Allan:
+    def allan(self) -> AllanEngine:
         """Allan variances."""
 
     @property
-    def dcc(self) -> Dcc:
+    def dcc(self) -> DccEngine:
         """Dynamic conditional correlation."""
 
     @property
-    def frames(self) -> Frames:
+    def frames(self) -> FramesEngine:
         """Frames of a serial dump."""
 
     @property
-    def garch(self) -> Garch:
+    def garch(self) -> GarchEngine:
         """Conditional variance."""
 
     @property
-    def kalman(self) -> Kalman:
+    def kalman(self) -> KalmanEngine:
         """Filters and smoother of a scalar rate."""
 
     @property
-    def statespace(self) -> StateSpaces:
+    def statespace(self) -> StateSpaceEngine:
         """Likelihood and smoother of a state space."""
 
     @property
-    def text(self) -> Text:
+    def text(self) -> TextEngine:
         """Lines of a text log."""
 
     @property
-    def weights(self) -> Weights:
+    def weights(self) -> WeightsEngine:
         """Minimum-variance weights."""

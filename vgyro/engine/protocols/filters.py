@@ -8,7 +8,7 @@ from vgyro.arrays import Floats, Ints
 from vgyro.engine.linear import StateSpace
 
 
-class Kalman(Protocol):
+class KalmanEngine(Protocol):
     """Filters and smoother of a scalar rate that N gyros measure."""
 
     def kalman_filter(
@@ -63,7 +63,7 @@ class Kalman(Protocol):
         """
 
 
-class StateSpaces(Protocol):
+class StateSpaceEngine(Protocol):
     """Likelihood and smoother of a linear Gaussian state space that one series measures (vgyro.engine.linear)."""
 
     def log_likelihood(
@@ -89,7 +89,7 @@ class StateSpaces(Protocol):
         """
 
 
-class Adaptive(Protocol):
+class AdaptiveEngine(Protocol):
     """Filters that adapt themselves to the array: recursions over the samples of one gap-free stretch."""
 
     def scale_bias_filter(

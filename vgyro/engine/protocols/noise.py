@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 from vgyro.arrays import Floats, Ints
+from vgyro.engine.models import LossyDifferences
 
 
-class Allan(Protocol):
+class AllanEngine(Protocol):
     """Allan variances, their degrees of freedom and limits, and what tells kinds of noise apart."""
 
     def differences(
@@ -39,13 +40,12 @@ class Allan(Protocol):
 
     def differences_over_losses(
         self, total: Floats, have: Ints, edges: Ints, factors: Ints, share: int = 3, kind: str = "overlapping"
-    ) -> tuple[Floats, Floats, Ints, Ints]:
+    ) -> LossyDifferences:
         """The same over stretches in which samples are lost: differences of the means of the samples that are there.
 
         total, have, edges : of slot_sums;  factors : array [M] int, averaging factors m
         share   : stretches of less than share·m slots are left out
         kind    : overlapping, modified or hadamard
-        returns : sums [M] in (deg/s)²; excess [M]; counts [M]; possible [M], differences there would be without a loss
         A mean over m slots counts where nine tenths of its samples are there, and a modified difference where nine
         tenths of the differences that it averages do; nothing is put in the place of a lost sample. The samples of n
         out of m slots have, where the noise is white, a mean of variance σ₁²/n, not σ₁²/m: excess·σ₁² / counts is what

@@ -23,7 +23,7 @@ class FrameFinder(Protocol):
         """Good and failed candidates of a buffer, uint8 [m]."""
 
 
-class Frames(Protocol):
+class FramesEngine(Protocol):
     """Frames of a serial dump: synchronisation, checksums, columns, runs; of any binary layout."""
 
     def Finder(self, frame: BinaryFrame) -> FrameFinder:
@@ -62,7 +62,7 @@ class LineParser(Protocol):
         """
 
 
-class Text(Protocol):
+class TextEngine(Protocol):
     """Lines of a text log: cells, numbers and stamps straight into columns."""
 
     def Parser(self, form: LineForm) -> LineParser:

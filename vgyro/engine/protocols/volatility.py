@@ -8,7 +8,7 @@ from vgyro.arrays import Floats, Ints
 from vgyro.engine.models import ConditionalWeights, DccFit, DccWindows, GarchFit, GarchWindows
 
 
-class Garch(Protocol):
+class GarchEngine(Protocol):
     """GARCH(1,1) by Gaussian quasi maximum likelihood, with the conventions of vgyro.volatility.fit_garch."""
 
     def fit_garch(self, r: Floats) -> GarchFit:
@@ -21,7 +21,7 @@ class Garch(Protocol):
         """
 
 
-class Dcc(Protocol):
+class DccEngine(Protocol):
     """DCC(1,1) of standardised residuals, with the conventions of vgyro.volatility.fit_dcc."""
 
     def fit_dcc(self, z: Floats, r: Floats | None = None, margins: GarchFit | None = None) -> DccFit:
@@ -46,7 +46,7 @@ class Dcc(Protocol):
         """Constant conditional correlation (Bollerslev 1990): DCC with a = b = 0. z [T, N]; statuses as in fit_dcc."""
 
 
-class Weights(Protocol):
+class WeightsEngine(Protocol):
     """Minimum-variance weights. Liu et al. (2015), eq. 1-6 and 15-16; they name an active-set method."""
 
     def min_variance_weights(self, H: Floats) -> Floats:

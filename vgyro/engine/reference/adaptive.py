@@ -17,7 +17,7 @@ def scale_bias_filter(
     state: np.ndarray,
     covariance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Adaptive.scale_bias_filter.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.scale_bias_filter.
 
     filterpy's ExtendedKalmanFilter with all 2+2N states; it updates by Joseph's form.
     """
@@ -65,7 +65,7 @@ def filter_bank(
     probability: np.ndarray,
     least: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Adaptive.filter_bank.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.filter_bank.
 
     One KalmanFilter of filterpy a member, and the densities of its N-dimensional innovations.
     """

@@ -11,6 +11,8 @@ import allantools
 import numpy as np
 from scipy.stats import chi2
 
+from vgyro.engine.models import LossyDifferences
+
 ESTIMATORS = {"overlapping": allantools.oadev, "modified": allantools.mdev, "hadamard": allantools.ohdev}
 REACH = {"overlapping": 2, "modified": 3, "hadamard": 3}
 D = {"overlapping": 2, "modified": 2, "hadamard": 3}
@@ -28,7 +30,7 @@ def differences(
     share: int = 2,
     kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.differences, by allantools."""
+    """As vgyro.engine.protocols.noise.AllanEngine.differences, by allantools."""
     sums, counts = np.zeros(len(factors)), np.zeros(len(factors), dtype=np.int64)
     # Of a modified variance a stretch of 3m samples has two differences.
     spare = 0 if kind == "modified" else 1
@@ -44,7 +46,7 @@ def differences(
 
 
 def slot_sums(rate: np.ndarray, slot: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.slot_sums, in NumPy."""
+    """As vgyro.engine.protocols.noise.AllanEngine.slot_sums, in NumPy."""
     totals, haves = [], []
     for start, stop in itertools.pairwise(edges.tolist()):
         inside = (slot >= start) & (slot < stop)
@@ -63,8 +65,8 @@ def differences_over_losses(
     factors: np.ndarray,
     share: int = 3,
     kind: str = "overlapping",
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.differences_over_losses, in NumPy.
+) -> LossyDifferences:
+    """As vgyro.engine.protocols.noise.AllanEngine.differences_over_losses, in NumPy.
 
     allantools would take a mean of any number of samples, or one that bridges any gap.
     """
@@ -74,7 +76,7 @@ def differences_over_losses(
         for row, m in enumerate(factors.tolist()):
             if share * m <= stop - start and REACH[kind] * m <= stop - start:
                 found[:, row] += _one_stretch(total[borders], have[borders], m, kind)
-    return found[0], found[1], found[2].astype(np.int64), found[3].astype(np.int64)
+    return LossyDifferences(found[0], found[1], found[2].astype(np.int64), found[3].astype(np.int64))
 
 
 def _one_stretch(total: np.ndarray, have: np.ndarray, m: int, kind: str) -> np.ndarray:
@@ -102,7 +104,7 @@ def _one_stretch(total: np.ndarray, have: np.ndarray, m: int, kind: str) -> np.n
 def lag_products(
     rate: np.ndarray, factors: np.ndarray, edges: np.ndarray | None = None, fewest: int = 4
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.lag_products, in NumPy."""
+    """As vgyro.engine.protocols.noise.AllanEngine.lag_products, in NumPy."""
     squares, products = np.zeros((len(factors), 3)), np.zeros((len(factors), 3))
     for piece in _stretches(rate, edges):
         for row, factor in enumerate(factors):
@@ -127,7 +129,7 @@ def _stretches(rate: np.ndarray, edges: np.ndarray | None) -> list[np.ndarray]:
 
 
 def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind: str = "overlapping") -> np.ndarray:
-    """As vgyro.engine.protocols.noise.Allan.degrees_of_freedom, by allantools."""
+    """As vgyro.engine.protocols.noise.AllanEngine.degrees_of_freedom, by allantools."""
     d, modified = D[kind], kind == "modified"
     alpha = min(max(alpha, STEEPEST[kind]), FLATTEST)
     edf = []
@@ -145,6 +147,6 @@ def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind:
 
 
 def limits(deviation: np.ndarray, edf: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.noise.Allan.limits."""
+    """As vgyro.engine.protocols.noise.AllanEngine.limits."""
     tail = (1 - confidence) / 2
     return deviation * np.sqrt(edf / chi2.ppf(1 - tail, edf)), deviation * np.sqrt(edf / chi2.ppf(tail, edf))

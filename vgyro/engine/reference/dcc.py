@@ -51,7 +51,7 @@ HESSIAN_STEP = 1e-4
 def fit_dcc_windows(
     r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray, lags: int = 1
 ) -> DccWindows:
-    """As vgyro.engine.protocols.volatility.Dcc.fit_dcc_windows: fit_dcc in a loop."""
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc_windows: fit_dcc in a loop."""
     fits, statistics = [], []
     for k in range(len(r)):
         window = np.ascontiguousarray(r[k], dtype=float)
@@ -81,7 +81,7 @@ def fit_dcc_windows(
 
 
 def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None = None) -> DccFit:
-    """As vgyro.engine.protocols.volatility.Dcc.fit_dcc; by SLSQP from several starts."""
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc; by SLSQP from several starts."""
     # Contiguous: the rounding of a sum depends on the stride.
     z = np.ascontiguousarray(z, dtype=float)
     n = z.shape[1]

@@ -42,7 +42,7 @@ class Finder:
 def read_columns(
     buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[FrameColumn]
 ) -> list[np.ndarray]:
-    """As vgyro.engine.protocols.reading.Frames.read_columns."""
+    """As vgyro.engine.protocols.reading.FramesEngine.read_columns."""
     if not len(places):
         return [np.empty(0, dtype=DTYPES[column.kind]) for column in columns]
     frames = np.lib.stride_tricks.sliding_window_view(buffer, length)[places]
@@ -50,7 +50,7 @@ def read_columns(
 
 
 def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int, modulus: int) -> np.ndarray:
-    """As vgyro.engine.protocols.reading.Frames.breaks."""
+    """As vgyro.engine.protocols.reading.FramesEngine.breaks."""
     if not len(start):
         return np.empty(0, dtype=np.int64)
     follows = np.diff(start) == length
@@ -61,7 +61,7 @@ def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int
 
 
 def longest_run(values: np.ndarray, time: np.ndarray, since: float, least: float) -> tuple[Run | None, float]:
-    """As vgyro.engine.protocols.reading.Frames.longest_run."""
+    """As vgyro.engine.protocols.reading.FramesEngine.longest_run."""
     first = np.insert(np.flatnonzero(values[1:] != values[:-1]) + 1, 0, 0)
     last = np.append(first[1:], len(values)) - 1
     began = time[first]

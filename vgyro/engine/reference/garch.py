@@ -46,7 +46,7 @@ class _Series:
 
 
 def fit_garch(r: np.ndarray) -> GarchFit:
-    """As vgyro.engine.protocols.volatility.Garch.fit_garch; each column by arch, from the best of its starts."""
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch; each column by arch, from the best of its starts."""
     r = np.asarray(r, dtype=float)
     fits, scales = [], []
     # Contiguous columns: the rounding of a mean depends on the stride.
@@ -71,7 +71,7 @@ def fit_garch(r: np.ndarray) -> GarchFit:
 
 
 def fit_garch_windows(r: np.ndarray) -> GarchWindows:
-    """As vgyro.engine.protocols.volatility.Garch.fit_garch_windows: fit_garch of each window."""
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch_windows: fit_garch of each window."""
     windows, _, n = r.shape
     omega, alpha, beta, likelihood = (np.full((windows, n), np.nan) for _ in range(4))
     stderr, status = np.full((windows, n, 3), np.nan), np.zeros((windows, n), dtype=np.uint8)

@@ -21,7 +21,7 @@ def kalman_filter(
     start: float,
     variance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Kalman.kalman_filter, by filterpy."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.kalman_filter, by filterpy."""
     rate, noise = np.asarray(rate, dtype=float), np.asarray(noise, dtype=float)
     noises = np.broadcast_to(noise, (len(rate), *noise.shape[-2:]))
     steps = np.broadcast_to(process, len(rate))
@@ -44,7 +44,7 @@ def kalman_filter(
 def rts_smoother(
     estimate: np.ndarray, variance: np.ndarray, transition: float, process: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.Kalman.rts_smoother, by filterpy."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.rts_smoother, by filterpy."""
     refuse_broken("estimate", estimate)
     refuse_broken("variance", variance)
     if len(estimate) == 0:
@@ -61,12 +61,12 @@ def rts_smoother(
 
 
 def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, start: float) -> np.ndarray:
-    """As vgyro.engine.protocols.filters.Kalman.constant_gain_filter, by filterpy's steady-state steps."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.constant_gain_filter, by filterpy's steady-state steps."""
     return _steady_state(rate, transition, np.broadcast_to(gain, rate.shape), start)
 
 
 def low_pass(signal: Floats, keep: float, gain: float, start: float) -> Floats:
-    """As vgyro.engine.protocols.filters.Kalman.low_pass, by scipy.signal.lfilter."""
+    """As vgyro.engine.protocols.filters.KalmanEngine.low_pass, by scipy.signal.lfilter."""
     from scipy.signal import lfilter
 
     refuse_broken("signal", signal)
@@ -76,7 +76,7 @@ def low_pass(signal: Floats, keep: float, gain: float, start: float) -> Floats:
 
 
 def settling_filter(signal: np.ndarray, keep: float, fading: float, start: float) -> np.ndarray:
-    """As vgyro.engine.protocols.filters.Kalman.settling_filter.
+    """As vgyro.engine.protocols.filters.KalmanEngine.settling_filter.
 
     filterpy's steady-state steps, given the gain 1 - φ_k of each sample.
     """

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def log_likelihood(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, skip: int = 0, regime: np.ndarray | None = None
 ) -> tuple[float, int]:
-    """As vgyro.engine.protocols.filters.StateSpaces.log_likelihood, by filterpy."""
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.log_likelihood, by filterpy."""
     z, r, flags, whole = checked(z, r, model, regime)
     variances = np.broadcast_to(r, len(z))
     total, seen, count = 0.0, 0, 0
@@ -35,7 +35,7 @@ def log_likelihood(
 def smooth(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As vgyro.engine.protocols.filters.StateSpaces.smooth, by filterpy's rts_smoother."""
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.smooth, by filterpy's rts_smoother."""
     z, r, flags, whole = checked(z, r, model, regime)
     if len(z) == 0:
         return np.empty(0), np.empty(0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro.arrays import Floats
 from vgyro.engine.covariance import conditional_covariance, usable
-from vgyro.engine.models import ConditionalWeights
+from vgyro.engine.models import ConditionalWeights, DccModel
 
 # One cvxpy problem holds this many small ones side by side, as the blocks of one quadratic form.
 BATCH = 2000
@@ -19,7 +19,7 @@ KKT = 1e-11
 
 
 def min_variance_weights(H: np.ndarray) -> np.ndarray:
-    """As vgyro.engine.protocols.volatility.Weights.min_variance_weights; of any number of gyros.
+    """As vgyro.engine.protocols.volatility.WeightsEngine.min_variance_weights; of any number of gyros.
 
     Where H⁻¹1 has no negative element it is the answer already, by its KKT conditions; the rest goes to cvxpy
     (Clarabel). Then the equality system is solved on the support, so that the weights are exact to rounding, and the
@@ -52,7 +52,7 @@ def conditional_weights(
     begin: int,
     end: int,
 ) -> ConditionalWeights:
-    """As vgyro.engine.protocols.volatility.Weights.conditional_weights, one window at a time.
+    """As vgyro.engine.protocols.volatility.WeightsEngine.conditional_weights, one window at a time.
 
     H_t comes from SciPy's filters, the weights from cvxpy.
     """
@@ -61,8 +61,8 @@ def conditional_weights(
     deviation, sigma = np.empty_like(weights), np.empty(weights.shape[:2])
     good = np.empty(weights.shape[:2], dtype=bool)
     for k in range(count):
-        path = conditional_covariance(r[k], inside, omega[k], alpha[k], beta[k], float(a[k]), float(b[k]), target[k])
-        H = path[begin:end]
+        model = DccModel(omega[k], alpha[k], beta[k], float(a[k]), float(b[k]), target[k])
+        H = conditional_covariance(r[k], inside, model)[begin:end]
         weights[k] = min_variance_weights(H)
         good[k] = ~np.isnan(weights[k]).any(axis=1)
         weights[k, ~good[k]] = 1.0 / n

@@ -39,7 +39,6 @@ def cross_allan(
     rate: np.ndarray,
     rate_hz: float,
     sampling: Sampling | None = None,
-    segment: np.ndarray | None = None,
     taus: np.ndarray | None = None,
     confidence: float = 0.95,
     engine: str = "native",
@@ -47,7 +46,7 @@ def cross_allan(
     """Overlapping Allan covariance and correlation of series that were sampled together.
 
     rate       : array [T, N], deg/s;  rate_hz : Hz
-    sampling   : when the samples were taken;  segment : array [T] int instead; None: there is no gap
+    sampling   : when the samples were taken; None: there is no gap
     taus       : array, s; None: three an octave, up to a third of the longest stretch
     confidence : of the limits;  engine : whose degrees of freedom
     returns    : CrossAllan. C_ij(τ) = ⟨d_i d_j⟩/2, d the differences of adjacent means over τ, over all that begin in a
@@ -62,7 +61,7 @@ def cross_allan(
     """
     rate = np.asarray(rate, dtype=float)
     if sampling is None:
-        sampling = Sampling.of(rate_hz, np.zeros(len(rate), np.int8) if segment is None else segment)
+        sampling = Sampling.of(rate_hz, np.zeros(len(rate), np.int8))
     slot, edges = sampling.slots()
     lengths, alike = np.unique(np.diff(edges), return_counts=True)
     factors = averaging_factors(rate_hz, int(lengths.max(initial=0)), taus)

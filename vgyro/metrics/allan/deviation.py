@@ -9,7 +9,7 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.arrays import Floats, Ints
-from vgyro.engine.protocols.noise import Allan
+from vgyro.engine.protocols.noise import AllanEngine
 from vgyro.errors import TooShort
 from vgyro.metrics.allan.noise_type import noise_exponents
 from vgyro.metrics.allan.robust import robust_differences, robust_edf, without_far_off
@@ -121,7 +121,7 @@ def allan_deviation(
 
 
 def _series(
-    rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: Allan, kind: str
+    rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: AllanEngine, kind: str
 ) -> _CurveSeries:
     if sampling is None:
         return _CurveSeries(rate, edges_of(len(rate), segment))
@@ -133,7 +133,9 @@ def _series(
     return _CurveSeries(rate, edges, SlotSums.of(rate, slot, edges, allan))
 
 
-def _variances(series: _CurveSeries, factors: np.ndarray, allan: Allan, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def _variances(
+    series: _CurveSeries, factors: np.ndarray, allan: AllanEngine, kind: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Variance at each factor, and the share of the differences there are."""
     sums, share = series.sums, LONGEST[kind]
     if sums is None:
@@ -149,7 +151,9 @@ def _variances(series: _CurveSeries, factors: np.ndarray, allan: Allan, kind: st
     return np.maximum(squares / some - single * excess / some, 0.0), counts / np.maximum(possible, 1)
 
 
-def _freedom(series: _CurveSeries, factors: Ints, exponent: Floats, share: Floats, allan: Allan, kind: str) -> Floats:
+def _freedom(
+    series: _CurveSeries, factors: Ints, exponent: Floats, share: Floats, allan: AllanEngine, kind: str
+) -> Floats:
     """Degrees of freedom [M]: those of all stretches that are long enough, times the share of the differences."""
     lengths, alike = np.unique(np.diff(series.edges), return_counts=True)
     estimator = "overlapping" if kind == "robust" else kind

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vgyro.engine.protocols.noise import Allan
+from vgyro.engine.protocols.noise import AllanEngine
 from vgyro.metrics.allan.slots import SlotSums
 
 ENOUGH_FOR_AUTOCORRELATION = 30
@@ -15,7 +15,7 @@ STEPS = (0, -1, -2)
 
 
 def noise_exponents(
-    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: Allan, sums: SlotSums | None = None
+    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: AllanEngine, sums: SlotSums | None = None
 ) -> np.ndarray:
     """Exponent of the power spectrum at each averaging factor: 2 … -4, never rising with τ.
 
@@ -37,7 +37,9 @@ def noise_exponents(
     return np.round(_falling(raw, weight)).astype(np.int64)
 
 
-def _of_whole(rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: Allan) -> tuple[np.ndarray, np.ndarray]:
+def _of_whole(
+    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: AllanEngine
+) -> tuple[np.ndarray, np.ndarray]:
     """Exponent and weight at each factor, of gap-free stretches."""
     lengths = np.diff(edges)
     raw, weight = np.zeros(len(factors)), np.ones(len(factors))
@@ -57,7 +59,7 @@ def _of_whole(rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: A
     return raw, weight
 
 
-def _over_losses(sums: SlotSums, factors: np.ndarray, allan: Allan) -> tuple[np.ndarray, np.ndarray]:
+def _over_losses(sums: SlotSums, factors: np.ndarray, allan: AllanEngine) -> tuple[np.ndarray, np.ndarray]:
     """Exponent and weight at each factor, of runs of block means that have half of their samples."""
     raw, weight = np.zeros(len(factors)), np.ones(len(factors))
     for index, factor in enumerate(factors.tolist()):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.arrays import Ints
-from vgyro.engine.protocols.noise import Allan
+from vgyro.engine.protocols.noise import AllanEngine
 
 PRESENT_TENTHS = 9
 """A mean counts where so many tenths of its samples are there."""
@@ -30,7 +30,7 @@ class SlotSums:
     edges: np.ndarray
 
     @classmethod
-    def of(cls, rate: np.ndarray, slot: np.ndarray, edges: np.ndarray, allan: Allan) -> SlotSums:
+    def of(cls, rate: np.ndarray, slot: np.ndarray, edges: np.ndarray, allan: AllanEngine) -> SlotSums:
         """rate [T] or [T, N], deg/s; slot [T] int, rising; edges [S + 1] in slots; allan: that module of an engine."""
         if rate.ndim == 1:
             total, have = allan.slot_sums(rate, slot, edges)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro.arrays import Floats, Ints
+from vgyro.metrics.allan.coefficient_limits import Drawing
 from vgyro.metrics.allan.covariance import CrossAllan
 from vgyro.metrics.allan.deviation import LONGEST_TAU
 
@@ -122,9 +123,7 @@ def _drifts(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray) -> bool:
     return bool(p_value.min() < EVIDENCE / octaves)
 
 
-def draw(
-    model: DriftModel, stretches: int, seconds: float, taus: np.ndarray, unit_s: float, replicates: int, seed: int
-) -> Drawn:
+def draw(model: DriftModel, stretches: int, seconds: float, taus: np.ndarray, unit_s: float, drawing: Drawing) -> Drawn:
     """Draw the series of a model again and again.
 
     stretches : how many, each `seconds` long; noise of one does not go on in the next
@@ -136,8 +135,8 @@ def draw(
     factors = factors[(factors >= 1) & (factors <= blocks // LONGEST_TAU)]
     found: list[tuple[np.ndarray, ...]] = []
     sizes: list[np.ndarray] = []
-    generator = np.random.default_rng(seed)
-    for white, drift in _series(model, stretches, blocks, block_s, replicates, generator):
+    generator = np.random.default_rng(drawing.seed)
+    for white, drift in _series(model, stretches, blocks, block_s, drawing.replicates, generator):
         # How large the drift is, is not known: its variance is freedom/χ² times the one found.
         size, series = np.ones(len(white)), white
         apart = [_variance(white), np.zeros(white.shape[:2])]

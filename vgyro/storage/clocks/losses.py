@@ -139,8 +139,7 @@ class LossFinder:
         lasts = _lasting(rest, near, half, period, last)
         # Rows too near the end of a piece are not judged.
         stop = min(high, len(times) - tail_rows(grid) + 1) if last else high
-        limit = (grid.least_loss - 0.5) * period
-        scan = _Scan(raised, ahead, lasts, period, limit, width, grid)
+        scan = _Scan(raised, ahead, lasts, period, grid)
         found = scan.run(max(low, 1), stop)
         shifts = np.zeros(high)
         shifts[found.rows] = found.shift
@@ -169,19 +168,12 @@ class _Scan:
     """Walk through the lasting steps of one stretch, in order."""
 
     def __init__(
-        self,
-        raised: np.ndarray,
-        ahead: np.ndarray,
-        lasts: np.ndarray,
-        period: float,
-        limit: float,
-        width: int,
-        grid: Judgement,
+        self, raised: np.ndarray, ahead: np.ndarray, lasts: np.ndarray, period: float, grid: Judgement
     ) -> None:
         self.raised, self.ahead, self.lasts = raised, ahead, lasts
-        self.period, self.limit, self.width = period, limit, width
+        self.period, self.limit, self.width = period, (grid.least_loss - 0.5) * period, grid.horizon
         self.noise, self.reach = grid.noise, grid.reach
-        self._first = backward_min(raised, width)
+        self._first = backward_min(raised, self.width)
 
     def run(self, low: int, stop: int) -> FoundEvents:
         rows: list[int] = []
