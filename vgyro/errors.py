@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 
 class VgyroError(Exception):
     """Base of every error that a user can cause or cure.
@@ -22,7 +24,7 @@ class VgyroError(Exception):
         cure = f" {_sentence(self.remedy[:1].upper() + self.remedy[1:])}" if self.remedy else ""
         return f"{place}{_sentence(self.what)}{cure}"
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
         return type(self), (self.what, self.where, self.remedy)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.errors import DataError
 from vgyro.fusion import design
 from vgyro.fusion.types import ArrayNoise, FilterParameters
@@ -101,7 +102,7 @@ class MeanCorrelation:
         return cls(mean, mean - widths[0], mean + widths[1])
 
 
-def dependence(correlation: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def dependence(correlation: Floats, pairs: tuple[Ints, Ints]) -> Floats:
     """Correlation [P, P] of the estimated correlations of P pairs: of normal noise, many samples.
 
     correlation : [N, N];  pairs : the gyros of each pair, ([P], [P])
@@ -117,7 +118,8 @@ def dependence(correlation: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]) ->
     size = np.sqrt(np.diag(covariance))
     # A pair of copies has no error, and nothing that depends on one.
     scale = np.where(size > 0, size, np.inf)
-    return covariance / np.outer(scale, scale)
+    correlations: Floats = covariance / np.outer(scale, scale)
+    return correlations
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def test_scale_against_the_sizes():
     # ppm of full scale from deg/s: 0.03 deg/s of 300 are 100 ppm, at the end of the range and of that reading.
     (found,) = fit(turn(LOOP, np.random.default_rng(0), 1, bent(100)))
     assert found.full_scale == 300
-    seen = np.abs(found.residual).max() / 300 * 1e6
+    seen = np.abs(found.points.residual).max() / 300 * 1e6
     assert found.figures["nonlinearity_full_scale"].value == pytest.approx(seen, rel=1e-4)
     assert found.scale == pytest.approx(SCALE, rel=1e-4)
 

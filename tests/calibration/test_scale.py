@@ -76,9 +76,10 @@ def test_the_floor_is_what_half_of_linear_gyros_show():
 
 def test_residuals():
     (found,) = fit(turn(LOOP, np.random.default_rng(5), 1, white=WHITE))
-    np.testing.assert_allclose(found.residual, (found.mean_count - found.bias) * found.scale - found.rate, atol=1e-9)
-    np.testing.assert_allclose(found.standard_error, WHITE, rtol=1e-3)
-    assert found.direction.tolist()[:3] == [0, 1, 1]
+    points = found.points
+    np.testing.assert_allclose(points.residual, (points.mean_count - found.bias) * found.scale - points.rate, atol=1e-9)
+    np.testing.assert_allclose(points.standard_error, WHITE, rtol=1e-3)
+    assert points.direction.tolist()[:3] == [0, 1, 1]
 
 
 def test_a_gyro_mounted_upside_down():
@@ -86,7 +87,7 @@ def test_a_gyro_mounted_upside_down():
     (found,) = fit_scale_factor(means, [gyro(sign=-1)])
     assert found.scale == pytest.approx(SCALE, rel=1e-3)
     assert found.scale_low < SCALE < found.scale_high
-    assert np.abs(found.residual).max() < 0.2
+    assert np.abs(found.points.residual).max() < 0.2
 
 
 def test_a_gyro_against_its_sign_is_named():
@@ -111,8 +112,8 @@ def test_a_clipped_plateau_is_left_out():
     means.mean[np.abs(ONCE) == 300] = np.nan
     (found,) = fit(means)
     assert found.scale == pytest.approx(SCALE)
-    assert found.rate.max() == 275
-    assert len(found.rate) == len(found.temperature) == len(found.direction) == len(ONCE) - 2
+    assert found.points.rate.max() == 275
+    assert len(found.points.rate) == len(found.points.temperature) == len(found.points.direction) == len(ONCE) - 2
 
 
 def test_earth_rate():
@@ -122,7 +123,7 @@ def test_earth_rate():
     (with_latitude,), (without,) = fit(means, latitude_deg=30.0), fit(means)
     assert with_latitude.bias == pytest.approx(BIAS, abs=1e-6)
     assert without.bias == pytest.approx(BIAS + felt / SCALE, abs=1e-6)
-    np.testing.assert_allclose(with_latitude.residual, 0, atol=1e-9)
+    np.testing.assert_allclose(with_latitude.points.residual, 0, atol=1e-9)
 
 
 def test_too_few_rates():

@@ -78,9 +78,12 @@ def test_losses_and_stretches():
     np.testing.assert_allclose(lossy.correlation, whole.correlation, atol=0.05)
     # Steps between two stretches do not count.
     segment = np.repeat([0, 1], [2000, 3000])
-    stepped = cross_allan(rate + 100 * segment[:, None], 1.0, segment=segment, taus=taus)
+    stepped = cross_allan(rate + 100 * segment[:, None], 1.0, Sampling.of(1.0, segment), taus=taus)
     np.testing.assert_allclose(
-        stepped.covariance, cross_allan(rate, 1.0, segment=segment, taus=taus).covariance, rtol=1e-6, atol=1e-9
+        stepped.covariance,
+        cross_allan(rate, 1.0, Sampling.of(1.0, segment), taus=taus).covariance,
+        rtol=1e-6,
+        atol=1e-9,
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.metrics import CrossAllan
+from vgyro.metrics.allan.coefficient_limits import Drawing
 from vgyro.metrics.intervals import drift
 from vgyro.metrics.intervals.drift import DriftModel, draw, fit_drift
 
@@ -70,7 +71,7 @@ def test_what_is_drawn_has_the_variances_of_the_model(white, walk, mean, within)
     # in doubt: a billion degrees of freedom.
     one = np.ones((1, 1))
     model = DriftModel(white * one, 0 * one, walk * one, 1e9)
-    drawn = draw(model, 1, 512.0, TAU[:8], 1.0, 1000, 1)
+    drawn = draw(model, 1, 512.0, TAU[:8], 1.0, Drawing(1000, 1))
     # 1000 draws: 4.5 % of a variance with one degree of freedom.
     assert np.mean(drawn.mean**2) == pytest.approx(mean, rel=0.15)
     assert np.mean(drawn.variance) == pytest.approx(within, rel=0.15)
@@ -83,9 +84,9 @@ def test_what_is_drawn_has_the_variances_of_the_model(white, walk, mean, within)
 def test_flicker_alone_and_what_is_not_known_of_its_size():
     # Closed form: σ² = (2 ln2/π)B² at any τ. With ν degrees of freedom the size scatters as ν/χ².
     one = np.ones((1, 1))
-    sure = draw(DriftModel(0 * one, one, 0 * one, 1e9), 1, 512.0, TAU[:8], 1.0, 300, 2)
+    sure = draw(DriftModel(0 * one, one, 0 * one, 1e9), 1, 512.0, TAU[:8], 1.0, Drawing(300, 2))
     np.testing.assert_allclose(sure.lowest_expected**2, FLICKER, rtol=1e-3)
-    doubtful = draw(DriftModel(0 * one, one, 0 * one, 5.0), 1, 512.0, TAU[:8], 1.0, 2000, 2)
+    doubtful = draw(DriftModel(0 * one, one, 0 * one, 5.0), 1, 512.0, TAU[:8], 1.0, Drawing(2000, 2))
     # Median of χ² with 5 degrees of freedom: 4.351.
     assert np.median(doubtful.variance_expected) == pytest.approx(np.mean(sure.variance) * 5 / 4.351, rel=0.06)
 
@@ -93,6 +94,6 @@ def test_flicker_alone_and_what_is_not_known_of_its_size():
 def test_poses_do_not_share_their_noise():
     # Eight stretches of a random walk: about each one's own mean K²·64/6; the mean of all has an eighth of K²·64/3.
     one = np.ones((1, 1))
-    drawn = draw(DriftModel(0 * one, 0 * one, one, 1e9), 8, 64.0, TAU[:5], 1.0, 500, 3)
+    drawn = draw(DriftModel(0 * one, 0 * one, one, 1e9), 8, 64.0, TAU[:5], 1.0, Drawing(500, 3))
     assert np.mean(drawn.variance) == pytest.approx(64 / 6, rel=0.1)
     assert np.mean(drawn.mean**2) == pytest.approx(64 / 3 / 8, rel=0.2)

@@ -17,6 +17,7 @@ import pytest
 from vgyro import units
 from vgyro.metrics import (
     AllanCurve,
+    LowPass,
     NoiseCoefficients,
     allan_deviation,
     noise_coefficients,
@@ -187,7 +188,7 @@ def test_the_reading_at_1_s_is_said_to_be_band_limited():
     rate = low_passed(simulate(1, 200.0, 1200.0, TRUTH), 200.0)
     curve = allan_deviation(rate, 200.0)
     fitted = noise_coefficients(curve, BANDWIDTH_HZ, replicates=50)
-    found = paper_readings(curve, spectral_density(rate, 200.0), fitted, 200.0, BANDWIDTH_HZ)
+    found = paper_readings(curve, spectral_density(rate, 200.0), fitted, 200.0, LowPass(BANDWIDTH_HZ))
     assert "band-limited" in found["arw_1s"].note
     assert "0.88" in found["arw_1s"].note
     assert found["arw_1s"].value == pytest.approx(0.88 * 6.17, rel=0.06)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vgyro.config import MetricsOptions
-from vgyro.papers.series import extremes, paired_ratios, series_figures
+from vgyro.papers.series import SlowSeries, extremes, paired_ratios, series_figures
 
 SECONDS = 7200
 PLACE = {"recording": "static", "axis": "z"}
@@ -23,7 +23,8 @@ def series():
 @pytest.fixture(scope="module")
 def found(series):
     names, values = series
-    return series_figures(PLACE, names, 3, values, np.zeros(SECONDS, dtype=int), 1.0, MetricsOptions(bootstrap=100))
+    slow = SlowSeries(names, values, np.zeros(SECONDS, dtype=int), 1.0)
+    return series_figures(PLACE, slow, 3, MetricsOptions(bootstrap=100))
 
 
 def figure(rows, method, metric):
@@ -66,9 +67,8 @@ def test_paired_ratios_know_that_the_noise_is_shared(series):
     names, values = series
     over = {"average": ("average", "")}
     halved = np.column_stack([values, 0.5 * values[:, 3]])
-    rows = paired_ratios(
-        PLACE, [*names, ("half", "")], halved, np.zeros(SECONDS, dtype=int), 1.0, over, MetricsOptions(bootstrap=100)
-    )
+    slow = SlowSeries([*names, ("half", "")], halved, np.zeros(SECONDS, dtype=int), 1.0)
+    rows = paired_ratios(PLACE, slow, over, MetricsOptions(bootstrap=100))
     for metric in ("mean", "sigma", "arw_1s"):
         # The same noise at half the size: the ratio has no scatter at all.
         row = figure(rows, "half", metric)

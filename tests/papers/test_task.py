@@ -11,7 +11,7 @@ from vgyro.simulate import manifest_of, parse_twin
 from vgyro.storage.inputs import read_board
 from vgyro.storage.tables import Provenance, write_table
 from vgyro.tasks.common import Task
-from vgyro.tasks.papers.evidence import gather
+from vgyro.tasks.papers.evidence import Wanted, gather
 from vgyro.tasks.papers.papers import main
 
 SECONDS = 600
@@ -221,7 +221,9 @@ def test_the_mean_at_constant_rate_is_the_set_rate_and_the_mean_error(made):
 def test_weight_of_the_faulty_gyro_by_stretch(tmp_path, options):
     manifest, board = options("liu2015")
     paths = write_artefacts(tmp_path / "results" / "liu2015", manifest)
-    evidence = gather(paths, manifest, board, VolatilityOptions(), MetricsOptions(bootstrap=50), slow_series=False)
+    evidence = gather(
+        paths, manifest, board, VolatilityOptions(), MetricsOptions(bootstrap=50), Wanted(slow_series=False)
+    )
     wanted = {"definition": "level", "model": "dcc", "mode": "in_sample", "gyro": "g4"}
     shares = {row["stretch"]: row["value"] for row in evidence.find("weights", wanted)}
     assert shares == {"before 1000 s": pytest.approx(0.1), "after 2500 s": 0.0}

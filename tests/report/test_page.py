@@ -8,14 +8,16 @@ import pytest
 from markupsafe import Markup
 
 from vgyro.report.page import Section, render_page
-from vgyro.report.plots import Axis, Curve, curve_plot
+from vgyro.report.plots import Axis, Curve, PlotFrame, PlotMarks, curve_plot
 from vgyro.report.tables import Cell, Notes, TableColumn, TableRow, number_cell, render_table
 
 
 def plot(name: str = "p") -> Markup:
     x = np.arange(10.0)
     curves = [Curve("a<b", "a<b", x, x, x - 1, x + 1), Curve("hidden", "hidden", x, 2 * x, visible=False)]
-    return curve_plot(name, "title & more", curves, Axis("time, s"), Axis("rate, deg/s"), spans=[(1.0, 2.0)])
+    return curve_plot(
+        PlotFrame(name, "title & more", Axis("time, s"), Axis("rate, deg/s")), curves, PlotMarks(spans=[(1.0, 2.0)])
+    )
 
 
 def test_a_page_asks_the_network_for_nothing_and_escapes_what_it_is_given() -> None:

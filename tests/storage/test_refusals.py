@@ -13,6 +13,7 @@ from vgyro.config import IntegrityOptions
 from vgyro.dataset import Recording
 from vgyro.errors import ConfigError, DataError
 from vgyro.storage import Refused, decode_dump, open_recording
+from vgyro.storage.decode import ReaderOptions
 from vgyro.storage.sources import open_sources
 
 DSP6 = b"".join(dsp6_stream(300)[0])
@@ -42,7 +43,7 @@ def test_missing_file_lists_what_is_there(dump, board, tmp_path):
 def test_a_file_of_another_board_names_that_board(dump, board, boards):
     path = dump(b"".join(mimu_stream(100)[0]))
     recording = Recording(name="a", kind="static", files=("x",))
-    reader = open_recording([path], recording, board("dsp6"), IntegrityOptions(), boards=boards)
+    reader = open_recording([path], recording, board("dsp6"), IntegrityOptions(), reading=ReaderOptions(boards=boards))
     with pytest.raises(Refused) as caught:
         list(reader)
     message = str(caught.value)

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 from task_options import complete
 
 from vgyro.engine.covariance import conditional_covariance
+from vgyro.engine.models import DccModel
 from vgyro.storage.schemas import SCHEMAS
 from vgyro.storage.tables import Provenance, read_columns, write_table
 from vgyro.tasks.common import Task
@@ -105,7 +106,7 @@ def test_likelihood_and_sigma_by_another_route(made, model, definition):
         r = array.residuals(number)
         one = stored_model(array, folder / "garch.parquet", folder / "dcc.parquet", number)
         a, b = (float(one.a[0]), float(one.b[0])) if model == "dcc" else (0.0, 0.0)
-        H = conditional_covariance(r, len(r), one.omega[0], one.alpha[0], one.beta[0], a, b, one.target[0])
+        H = conditional_covariance(r, len(r), DccModel(one.omega[0], one.alpha[0], one.beta[0], a, b, one.target[0]))
         total = sum(multivariate_normal.logpdf(e, np.zeros(3), h) for e, h in zip(r, H, strict=True))
         assert found["log_likelihood"][row] == pytest.approx(total, abs=1e-6)
         ahead = slice(stop, stop + STEP)

@@ -17,7 +17,7 @@ from vgyro.metrics import allan_deviation
 from vgyro.storage.tables import Provenance, read_columns, read_metadata, write_json, write_table
 from vgyro.tasks.common import Task
 from vgyro.tasks.figures import crosscheck
-from vgyro.tasks.figures.crosscheck_rows import compare, compare_maximum
+from vgyro.tasks.figures.crosscheck_rows import Check, compare, compare_maximum
 from vgyro.tasks.fusion import fuse
 from vgyro.tasks.volatility import assemble, series
 
@@ -162,11 +162,11 @@ def test_a_spoilt_column_fails_its_check(analysed: Path, tmp_path: Path, column:
 
 
 def test_a_maximum_fails_only_where_ours_is_the_smaller() -> None:
-    assert compare_maximum("x", "", 0, "", 5.0, 4.0, 1e-3).passed
-    assert compare_maximum("x", "", 0, "", 5.0, 5.0009, 1e-3).passed
-    assert not compare_maximum("x", "", 0, "", 5.0, 5.0011, 1e-3).passed
-    assert not compare_maximum("x", "", 0, "", math.nan, 5.0, 1e-3).passed
-    assert not compare("x", "", 0, "", np.array([1.0, np.nan]), np.array([1.0, 2.0]), 1.0, "1").passed
+    assert compare_maximum(Check("x", "", 0, ""), 5.0, 4.0, 1e-3).passed
+    assert compare_maximum(Check("x", "", 0, ""), 5.0, 5.0009, 1e-3).passed
+    assert not compare_maximum(Check("x", "", 0, ""), 5.0, 5.0011, 1e-3).passed
+    assert not compare_maximum(Check("x", "", 0, ""), math.nan, 5.0, 1e-3).passed
+    assert not compare(Check("x", "", 0, ""), np.array([1.0, np.nan]), np.array([1.0, 2.0]), 1.0, "1").passed
 
 
 def test_the_definition_of_allan_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 from vgyro.engine.covariance import conditional_covariance
+from vgyro.engine.models import DccModel
 from vgyro.volatility import fit_garch
 from vgyro.volatility.check import covariance_after, greatest_log_likelihood
 
@@ -63,11 +64,11 @@ def test_covariance_of_the_window_and_after_it():
     r = 0.05 * rng.standard_normal((121, 3))
     target = np.array([[1.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, 1.0]])
     omega, alpha, beta = np.array([1e-4, 2e-4, 5e-4]), np.array([0.05, 0.1, 0.02]), np.array([0.9, 0.8, 0.7])
-    expected = conditional_covariance(r, 120, omega, alpha, beta, 0.03, 0.94, target)
-    last, following = covariance_after(r[:120], omega, alpha, beta, 0.03, 0.94, target)
+    expected = conditional_covariance(r, 120, DccModel(omega, alpha, beta, 0.03, 0.94, target))
+    last, following = covariance_after(r[:120], DccModel(omega, alpha, beta, 0.03, 0.94, target))
     np.testing.assert_allclose(last, expected[119], rtol=1e-10)
     np.testing.assert_allclose(following, expected[120], rtol=1e-10)
-    constant = conditional_covariance(r, 120, omega, alpha, beta, 0.0, 0.0, target)
+    constant = conditional_covariance(r, 120, DccModel(omega, alpha, beta, 0.0, 0.0, target))
     np.testing.assert_allclose(
-        covariance_after(r[:120], omega, alpha, beta, 0.0, 0.0, target)[1], constant[120], rtol=1e-10
+        covariance_after(r[:120], DccModel(omega, alpha, beta, 0.0, 0.0, target))[1], constant[120], rtol=1e-10
     )

@@ -8,6 +8,7 @@ import pytest
 
 from vgyro.engine.covariance import conditional_covariance
 from vgyro.engine.independent import nnls_weights
+from vgyro.engine.models import DccModel
 from vgyro.volatility import Window, WindowModels, stretches, weights_of_windows, windows
 from vgyro.volatility.rolling import rows_needed
 from vgyro.volatility.series import window_residuals
@@ -153,10 +154,11 @@ def test_samples_against_their_window_alone(broken_series, definition):
         run = next(run for run in runs if run.start <= window.start < run.stop)
         gyros = np.isfinite(models.omega[number])
         r = window_residuals(values, window, definition, 15, min(9, run.stop - window.stop), run.start)[:, gyros]
-        H = conditional_covariance(
-            r, 40, models.omega[number, gyros], models.alpha[number, gyros], models.beta[number, gyros],
-            models.a[number], models.b[number], models.target[number][np.ix_(gyros, gyros)],
+        model = DccModel(
+            models.omega[number, gyros], models.alpha[number, gyros], models.beta[number, gyros], models.a[number],
+            models.b[number], models.target[number][np.ix_(gyros, gyros)],
         )  # fmt: skip
+        H = conditional_covariance(r, 40, model)
         sample = window.stop - 1 if mode == "in_sample" else window.stop + 2
         w = nnls_weights(H[sample - window.start])
         np.testing.assert_allclose(found[mode].weights[sample, gyros], w, atol=1e-11)
@@ -229,14 +231,14 @@ def test_covariance_by_hand():
     r = rng.standard_normal((8, 2))
     target = np.array([[1.0, 0.3], [0.3, 1.0]])
     omega, alpha, beta, a, b = np.array([0.1, 0.2]), np.array([0.2, 0.1]), np.array([0.6, 0.7]), 0.1, 0.7
-    found = conditional_covariance(r, 5, omega, alpha, beta, a, b, target)
+    found = conditional_covariance(r, 5, DccModel(omega, alpha, beta, a, b, target))
     h, q = omega + (alpha + beta) * np.mean(r[:5] ** 2, axis=0), target
     for t in range(8):
         scale = np.sqrt(h / np.diag(q))
         np.testing.assert_allclose(found[t], q * np.outer(scale, scale), rtol=1e-12)
         z = r[t] / np.sqrt(h)
         h, q = omega + alpha * r[t] ** 2 + beta * h, (1 - a - b) * target + a * np.outer(z, z) + b * q
-    constant = conditional_covariance(r, 5, omega, alpha, beta, 0.0, b, target)
+    constant = conditional_covariance(r, 5, DccModel(omega, alpha, beta, 0.0, b, target))
     size = np.sqrt(np.diagonal(constant, axis1=1, axis2=2))
     np.testing.assert_allclose(constant[:, 0, 1] / (size[:, 0] * size[:, 1]), 0.3)
 
@@ -244,9 +246,9 @@ def test_covariance_by_hand():
 def test_a_first_sample_without_difference_takes_the_next_covariance():
     r = np.random.default_rng(5).standard_normal((8, 2))
     given = np.array([0.1, 0.2]), np.array([0.2, 0.1]), np.array([0.6, 0.7]), 0.1, 0.7, np.eye(2)
-    full = conditional_covariance(r[1:], 7, *given)
+    full = conditional_covariance(r[1:], 7, DccModel(*given))
     r[0] = np.nan
-    found = conditional_covariance(r, 8, *given)
+    found = conditional_covariance(r, 8, DccModel(*given))
     np.testing.assert_array_equal(found[1:], full)
     np.testing.assert_array_equal(found[0], found[1])
 

@@ -7,7 +7,7 @@ import pytest
 
 from vgyro.errors import ConfigError
 from vgyro.volatility import Window, block_means, detrended, window_residuals
-from vgyro.volatility.batches import fitted_batch, window_batch
+from vgyro.volatility.batches import WindowPlaces, fitted_batch, window_batch
 from vgyro.volatility.blocks import BlockMeans, RunFinder
 from vgyro.volatility.windowed import fitted_residuals
 
@@ -160,7 +160,7 @@ def test_many_windows_at_once_are_the_windows_one_by_one(definition):
     values = rng.standard_normal((200, 3))
     values[60:110, 1] = 0.3
     starts, stretch_starts = np.array([20, 60, 65, 90, 152]), np.array([20, 20, 20, 90, 90])
-    found = window_batch(values, starts, 40, 8, definition, 7, stretch_starts)
+    found = window_batch(values, WindowPlaces(starts, 40, 8, stretch_starts), definition, 7)
     for r, start, first in zip(found, starts, stretch_starts, strict=True):
         np.testing.assert_array_equal(r, window_residuals(values, Window(start, start + 40), definition, 7, 8, first))
     for begins in (starts == stretch_starts, starts > stretch_starts):
@@ -168,7 +168,7 @@ def test_many_windows_at_once_are_the_windows_one_by_one(definition):
         for r, start, first in zip(fitted, starts[begins], stretch_starts[begins], strict=True):
             expected = fitted_residuals(values, Window(start, start + 40), definition, 7, first)
             np.testing.assert_array_equal(r, expected)
-    stuck = window_batch(values, starts[1:2], 40, 0, definition, 7, stretch_starts[1:2])
+    stuck = window_batch(values, WindowPlaces(starts[1:2], 40, 0, stretch_starts[1:2]), definition, 7)
     fitted = fitted_batch(values, starts[1:2], 40, definition, 7, stretch_starts[1:2])
     assert not fitted[:, :, 1].any()
     np.testing.assert_array_equal(fitted[:, :, [0, 2]], stuck[:, :, [0, 2]])

@@ -19,7 +19,7 @@ def values(simulator, equicorrelated):
 def windows_fit(r, engine="native"):
     """GARCH and DCC of windows r [K, T, N]."""
     garch = fit_garch_windows(r)
-    return fit_array_dcc_windows(r, garch.omega, garch.alpha, garch.beta, garch.status, engine)
+    return fit_array_dcc_windows(r, garch, engine)
 
 
 @pytest.mark.parametrize("definition", ["level", "demeaned", "difference", "residual"])

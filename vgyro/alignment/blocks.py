@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
+from vgyro.arrays import Floats
 from vgyro.runs import runs
 
 BLOCK_S = 10.0
@@ -56,11 +57,12 @@ class SampleBlocks:
             return np.bincount(self.block, values, minlength=self.count)
         return np.stack([np.bincount(self.block, row, minlength=self.count) for row in values])
 
-    def detrended(self, values: np.ndarray) -> np.ndarray:
+    def detrended(self, values: Floats) -> Floats:
         """Values less the straight line of their block."""
         level = (self.sums(values) / self.size)[..., self.block]
         slope = (self.sums(values * self.lever) / self.spread)[..., self.block]
-        return values - level - slope * self.lever
+        rest: Floats = values - level - slope * self.lever
+        return rest
 
     def spectra(self, values: np.ndarray) -> np.ndarray:
         """Transform of each block, padded to twice its length: [..., B, F]."""
@@ -80,7 +82,7 @@ class SampleBlocks:
         weight[[0, -1]] = 1.0
         return weight
 
-    def smoothed(self, spectrum: np.ndarray, effective: float) -> np.ndarray:
+    def smoothed(self, spectrum: Floats, effective: float) -> Floats:
         """A power spectrum [..., F] of so many blocks, averaged over neighbouring bins."""
         width = int(min(SMOOTHING_HZ * self.padded * self.step_s, max(SMOOTHING_BINS / effective, 3))) | 1
         width = min(width, 2 * (spectrum.shape[-1] // 2) - 1)
@@ -88,10 +90,11 @@ class SampleBlocks:
             (spectrum[..., width // 2 : 0 : -1], spectrum, spectrum[..., -2 : -2 - width // 2 : -1]), axis=-1
         )
         total = np.cumsum(np.concatenate((np.zeros((*padded.shape[:-1], 1)), padded), axis=-1), axis=-1)
-        return (total[..., width:] - total[..., :-width]) / width
+        means: Floats = (total[..., width:] - total[..., :-width]) / width
+        return means
 
 
-def score_covariance(blocks: SampleBlocks, slopes: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def score_covariance(blocks: SampleBlocks, slopes: Floats, residual: Floats) -> Floats:
     """Covariance of the sums Σ slopes · residual, [P, P].
 
     slopes : array [P, K], known; residual : array [K], stationary with any colour within a block
@@ -107,14 +110,15 @@ def score_covariance(blocks: SampleBlocks, slopes: np.ndarray, residual: np.ndar
     colour = blocks.smoothed(weight @ power, effective)
     transforms = blocks.spectra(slopes)
     bins = blocks.bins / blocks.padded
-    even = np.einsum("pbf,qbf,f->pq", transforms, transforms.conj(), colour * bins, optimize=True).real
+    even: Floats = np.einsum("pbf,qbf,f->pq", transforms, transforms.conj(), colour * bins, optimize=True).real
     even *= (float(stats.t.ppf(0.975, 4 * effective)) / float(stats.norm.ppf(0.975))) ** 2
     if effective < FEWEST_FOR_OWN:
         return even
     own = blocks.sums(slopes * residual)
     own = own @ own.T * effective / (effective - len(slopes))
     factor = np.sqrt(np.maximum(np.diag(own) / np.diag(even), 1.0))
-    return even * np.outer(factor, factor)
+    covariance: Floats = even * np.outer(factor, factor)
+    return covariance
 
 
 def independent_values(blocks: SampleBlocks, one: np.ndarray, two: np.ndarray) -> float:

@@ -12,6 +12,7 @@ from vgyro.alignment.clock import CUTOFFS_HZ
 from vgyro.alignment.moving import moving_rows
 from vgyro.alignment.pair import ClockRelation, agreement, rate_and_slope
 from vgyro.alignment.streams import AlignedStream, Band, highest_cutoff, low_pass
+from vgyro.arrays import Floats
 
 FOUND, NO_MOTION, TOO_FEW = "found", "no motion", "too few gyros"
 FALSE_ALARM = 0.01  # chance that a recording of equal gyros shows a delay at all
@@ -178,12 +179,13 @@ def _fit(bands: list[Band], delay: np.ndarray) -> _DelayFit | None:
     return _DelayFit(delay, influence, mean_slope, shifted.blocks)
 
 
-def _scales(rate: np.ndarray) -> np.ndarray:
+def _scales(rate: Floats) -> Floats:
     """Scale factors of the gyros, their mean one: [N]; from products between gyros, in which noise has no part."""
     products = rate @ rate.T
     if len(rate) == 2:  # one product cannot tell two factors
         scale = np.sqrt(np.diag(products))
-        return scale / scale.mean()
+        scales: Floats = scale / scale.mean()
+        return scales
     scale = np.ones(len(rate))
     np.fill_diagonal(products, 0.0)
     for _ in range(SCALE_STEPS):

@@ -24,6 +24,8 @@ from functools import cache
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
+
 HALF_WIDTHS = (16, 8, 4, 2, 1)  # samples on each side
 KAISER = 7.5
 PHASES = 1024  # between two samples; linear between them: an error below 1e-6
@@ -32,7 +34,7 @@ ON_SAMPLE = 1e-9  # in samples: a position so near a sample is that sample
 
 
 @cache
-def _kernels(half: int) -> np.ndarray:
+def _kernels(half: int) -> Floats:
     """Weights [PHASES + 1, 2·half] of the samples around a position, by its fraction; each row sums to one."""
     fraction = np.linspace(0, 1, PHASES + 1)[:, None]
     if half == 1:
@@ -42,15 +44,18 @@ def _kernels(half: int) -> np.ndarray:
     if half == HALF_WIDTHS[0]:
         window = np.i0(KAISER * np.sqrt(np.maximum(1 - (distance / half) ** 2, 0))) / np.i0(KAISER)
         weights = np.sinc(distance) * window * (np.abs(distance) < half)
-        return weights / weights.sum(axis=1, keepdims=True)
+        kernels: Floats = weights / weights.sum(axis=1, keepdims=True)
+        return kernels
     spacing = offsets[:, None] - offsets + np.eye(2 * half)
     others = np.where(np.eye(2 * half, dtype=bool), 1.0, distance[:, None, :])
-    return (others / spacing).prod(axis=2)  # Lagrange's polynomials
+    kernels = (others / spacing).prod(axis=2)  # Lagrange's polynomials
+    return kernels
 
 
 @cache
-def _gains(half: int) -> np.ndarray:
-    return (_kernels(half) ** 2).sum(axis=1)
+def _gains(half: int) -> Floats:
+    gains: Floats = (_kernels(half) ** 2).sum(axis=1)
+    return gains
 
 
 def interpolate(values: np.ndarray, at: np.ndarray, segment: np.ndarray | None = None) -> np.ndarray:
@@ -74,7 +79,7 @@ def interpolate(values: np.ndarray, at: np.ndarray, segment: np.ndarray | None =
     return result
 
 
-def noise_gain(at: np.ndarray, values: np.ndarray | None = None, segment: np.ndarray | None = None) -> np.ndarray:
+def noise_gain(at: Floats, values: Floats | None = None, segment: Ints | None = None) -> Floats:
     """Variance of interpolated white noise over that of the samples; divide a measured variance by its mean.
 
     at      : array [M], positions in samples

@@ -10,6 +10,7 @@ import numpy as np
 from vgyro.alignment.blocks import SHORTEST_S, SampleBlocks, independent_values, score_covariance
 from vgyro.alignment.interpolation import interpolate
 from vgyro.alignment.streams import Band
+from vgyro.arrays import Bools, Floats
 from vgyro.units import Quantity
 
 MOST_STEPS = 15
@@ -145,7 +146,7 @@ def agreement(
     return result
 
 
-def _bread(overlap: _Overlap, lever: np.ndarray, scale: float) -> np.ndarray:
+def _bread(overlap: _Overlap, lever: Floats, scale: float) -> Floats:
     """Information about (lag, drift) from the product of both derivatives, [2, 2]."""
     weights = np.stack([np.ones_like(lever), lever])
     left = overlap.blocks.detrended(scale * overlap.raw[1] * weights)
@@ -187,7 +188,7 @@ def rate_and_slope(band: Band, places: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return both.real, both.imag
 
 
-def _moving(blocks: SampleBlocks, columns: np.ndarray) -> np.ndarray:
+def _moving(blocks: SampleBlocks, columns: Floats) -> Bools:
     """Blocks in which one of the two moves: [B]; all, if the others agree too, or if none stands out.
 
     The noise of a block at rest is far from the centre of the information and would count there as information about
@@ -196,7 +197,9 @@ def _moving(blocks: SampleBlocks, columns: np.ndarray) -> np.ndarray:
     power = blocks.sums((columns[[1, 3]] / columns[[1, 3]].std(axis=1, keepdims=True)) ** 2).sum(axis=0) / blocks.size
     moving = power > STANDS_OUT * np.quantile(power, QUIET_QUANTILE, method="lower")
     if not moving.any():
-        return ~moving
+        still: Bools = ~moving
+        return still
     quiet = columns[:, ~moving[blocks.block]]
     agreed = abs(quiet[1] @ quiet[3]) / math.sqrt(max(float(quiet[1] @ quiet[1]) * float(quiet[3] @ quiet[3]), 1e-300))
-    return moving | (agreed > AGREED)
+    moves: Bools = moving | (agreed > AGREED)
+    return moves

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import signal
 
 from vgyro.alignment.interpolation import interpolate
+from vgyro.arrays import Floats
 
 GAP = 1.5  # periods between two samples: more is a gap
 LONGEST_HOLE = 3  # samples that are missing in a row and bridged by a straight line, for the estimate alone
@@ -62,9 +63,10 @@ def resample(stream: AlignedStream, time: np.ndarray) -> np.ndarray:
     return interpolate(stream.rate, positions(stream, time), stretches(stream.time, stream.rate_hz))
 
 
-def positions(stream: AlignedStream, time: np.ndarray) -> np.ndarray:
+def positions(stream: AlignedStream, time: Floats) -> Floats:
     """Readings of a stream's clock as positions in its samples, for `noise_gain`: [M] s → [M]; NaN outside."""
-    return np.interp(time, stream.time, np.arange(len(stream.time), dtype=float), left=np.nan, right=np.nan)
+    places: Floats = np.interp(time, stream.time, np.arange(len(stream.time), dtype=float), left=np.nan, right=np.nan)
+    return places
 
 
 def highest_cutoff(rate_hz: float) -> float:
@@ -113,15 +115,17 @@ def _filters(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
     return taps, -slopes / (slopes @ np.arange(count))
 
 
-def _thin(taps: np.ndarray, values: np.ndarray, factor: int, count: int) -> np.ndarray:
+def _thin(taps: Floats, values: Floats, factor: int, count: int) -> Floats:
     """Filtered values at every factor-th sample at which the filter lies within the stretch."""
     skip = len(taps) - 1
     if factor == 1:
-        return signal.oaconvolve(values, taps, mode="valid")[:count]
+        thinned: Floats = signal.oaconvolve(values, taps, mode="valid")[:count]
+        return thinned
     start = -skip % factor  # zeros in front, so that the first whole window falls on a kept sample
     out = signal.upfirdn(taps, np.concatenate((np.zeros(start), values)), 1, factor)
     first = (skip + start) // factor
-    return out[first : first + count]
+    thinned = out[first : first + count]
+    return thinned
 
 
 def _usable(stream: AlignedStream) -> list[tuple[int, int]]:

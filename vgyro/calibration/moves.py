@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools
 from vgyro.config import RestOptions
 from vgyro.runs import true_runs
 
@@ -165,12 +166,13 @@ def quiet_level(gyro: GyroWindows) -> float:
     return max(float(np.quantile(deviation, QUIET_QUANTILE)), STEPS * gyro.step)
 
 
-def _moving(gyro: GyroWindows, quiet: float, threshold: float) -> np.ndarray:
+def _moving(gyro: GyroWindows, quiet: float, threshold: float) -> Bools:
     """Windows [W] in which one gyro sees more than its noise; where it has no value it sees nothing."""
-    return np.nan_to_num(gyro.deviation) > threshold * quiet
+    moving: Bools = np.nan_to_num(gyro.deviation) > threshold * quiet
+    return moving
 
 
-def _most(moves: dict[int, np.ndarray], axes: list[str]) -> np.ndarray:
+def _most(moves: dict[int, Bools], axes: list[str]) -> Bools:
     """Windows [W] in which most gyros of an axis move, and two of the board at least, if it has two."""
     columns = np.stack(list(moves.values()))
     two = columns.sum(axis=0) >= min(2, len(columns))
@@ -178,7 +180,8 @@ def _most(moves: dict[int, np.ndarray], axes: list[str]) -> np.ndarray:
     for axis in dict.fromkeys(axes):
         members = columns[[one == axis for one in axes]]
         found |= members.sum(axis=0) > len(members) / 2
-    return found & two
+    moving: Bools = found & two
+    return moving
 
 
 def _turning(rates: np.ndarray, moving: np.ndarray, least: float) -> np.ndarray:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 BATCHES = 20
 FEWEST_BATCHES = 4
 TURN = 360.0
@@ -135,18 +137,20 @@ def average_plateaus(
     )  # fmt: skip
 
 
-def _mean_of_known(values: np.ndarray) -> np.ndarray:
+def _mean_of_known(values: Floats) -> Floats:
     """Mean along the first axis of the values that are there; NaN where there are none."""
     there = np.isfinite(values)
     if there.all():
-        return np.mean(values, axis=0)
+        mean: Floats = np.mean(values, axis=0)
+        return mean
     count = there.sum(axis=0)
     return np.where(count > 0, np.where(there, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
-def _batch_error(part: np.ndarray) -> np.ndarray:
+def _batch_error(part: Floats) -> Floats:
     """Standard error of the mean of part [T, N] by batch means."""
     length = max(len(part) // BATCHES, 1)
     batches = len(part) // length
     means = part[: batches * length].reshape(batches, length, part.shape[1]).mean(axis=1)
-    return means.std(axis=0, ddof=1) / np.sqrt(batches)
+    error: Floats = means.std(axis=0, ddof=1) / np.sqrt(batches)
+    return error

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.calibration.wandering import Errors, LinearFit
 
 SAME_RATE = 1e-4  # of the largest rate
@@ -96,21 +97,24 @@ class RateResponse:
     @property
     def bends(self) -> int:
         """Coefficients of the bend; 0 with too few rates."""
-        return self.model.bend.shape[1]
+        bends: int = self.model.bend.shape[1]
+        return bends
 
     @property
     def drifts(self) -> bool:
         """Was a drift in time taken off?"""
-        return self.model.drift.shape[1] > 0
+        drifts: bool = self.model.drift.shape[1] > 0
+        return drifts
 
-    def half_slope(self, side: int) -> np.ndarray | None:
+    def half_slope(self, side: int) -> Floats | None:
         """Combination [p]: slope of the least-squares line through the plateaus from rate 0 up (1) or down (-1)."""
         visits, group = self.model.visits, self.model.group
         chosen = side * visits.rate >= -SAME_RATE * visits.largest
         if np.unique(group[chosen]).size < FEWEST_OF_A_HALF or not self.bends:
             return None
         rate = visits.rate[chosen] - visits.rate[chosen].mean()
-        return rate @ self.transfer[group[chosen]] / (rate @ rate)
+        slope: Floats = rate @ self.transfer[group[chosen]] / (rate @ rate)
+        return slope
 
 
 def same_rates(rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,12 +205,13 @@ def _drift(visits: Visits, others: np.ndarray) -> np.ndarray:
     return drift if left > APART * np.linalg.norm(drift) else none
 
 
-def _smooth_bend(rates: np.ndarray) -> np.ndarray:
+def _smooth_bend(rates: Floats) -> Floats:
     """[J, q], without the straight line in it."""
     size = rates / np.abs(rates).max()
     terms = max(min(MOST_BENDS, (len(rates) - 2) // RATES_PER_BEND), 0)
     shapes = np.column_stack([np.abs(size), size**3, size**2, size**5, size**4])[:, :terms]
-    return _left_by(straight(rates)) @ shapes
+    bend: Floats = _left_by(straight(rates)) @ shapes
+    return bend
 
 
 def _free_bend(rates: np.ndarray) -> np.ndarray:
@@ -219,16 +224,17 @@ def _loop_shape(size: np.ndarray, terms: int) -> np.ndarray:
     return np.column_stack([np.ones_like(size), size**2, size])[:, :terms]
 
 
-def _left_by(design: np.ndarray) -> np.ndarray:
+def _left_by(design: Floats) -> Floats:
     """What least squares on the design [P, p] leaves: [P, P]."""
     return np.eye(len(design)) - design @ np.linalg.pinv(design)
 
 
-def _taken_off(design: np.ndarray, found: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _taken_off(design: Floats, found: Floats, columns: Bools) -> Floats:
     """The values less some columns [p] bool of the design [P, p] times what `found` [p, P] gives for them: [P, P]."""
     return np.eye(len(design)) - design[:, columns] @ found[columns]
 
 
-def _averaging(chosen: np.ndarray) -> np.ndarray:
+def _averaging(chosen: Bools) -> Floats:
     """[J, P] bool → weights that average what each row has chosen."""
-    return chosen / chosen.sum(axis=1, keepdims=True)
+    weights: Floats = chosen / chosen.sum(axis=1, keepdims=True)
+    return weights

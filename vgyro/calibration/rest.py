@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.config import RestOptions
 from vgyro.runs import runs
 
@@ -58,11 +59,12 @@ def find_rest(
     return _long_stretches(still, segment, round(options.guard_s * rate_hz), round(options.min_duration_s * rate_hz))
 
 
-def _most(scores: np.ndarray) -> np.ndarray:
+def _most(scores: Floats) -> Floats:
     """Of scores [N, n] the one that a quarter of the gyros reach, in each window; NaN: the gyro has no value there."""
     known = ~np.isnan(scores)
     if known.all():
-        return np.sort(scores, axis=0)[-math.ceil(len(scores) / MOVING_SHARE)]
+        score: Floats = np.sort(scores, axis=0)[-math.ceil(len(scores) / MOVING_SHARE)]
+        return score
     number = known.sum(axis=0)
     needed = np.maximum(-(-number // MOVING_SHARE), 1)
     ordered = np.sort(np.where(known, scores, -np.inf), axis=0)
@@ -70,7 +72,7 @@ def _most(scores: np.ndarray) -> np.ndarray:
     return np.where(number > 0, found, np.inf)
 
 
-def _scores(rate: np.ndarray, starts: np.ndarray, length: int) -> np.ndarray | None:
+def _scores(rate: Floats, starts: Ints, length: int) -> Floats | None:
     """How far each window is from rest, in quiet levels, NaN where it has too few values.
 
     None for a gyro that never changes, or never has a value.
@@ -93,7 +95,8 @@ def _scores(rate: np.ndarray, starts: np.ndarray, length: int) -> np.ndarray | N
         return np.full(len(starts), np.inf)
     calm = spread <= 2 * quiet
     level = float(np.median(mean[calm]))
-    return np.maximum(spread, np.abs(mean - level)) / quiet
+    scores: Floats = np.maximum(spread, np.abs(mean - level)) / quiet
+    return scores
 
 
 def _moments(rate: np.ndarray, middle: float, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:

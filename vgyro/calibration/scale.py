@@ -33,6 +33,22 @@ class GyroNominal:
 
 
 @dataclass(frozen=True)
+class FittedPoints:
+    """The plateaus [P] that a line was fitted through, in their order.
+
+    rate deg/s of the table;  mean_count counts;  residual deg/s, output - table;  standard_error deg/s
+    direction 1 up -1 down 0 none;  temperature °C
+    """
+
+    rate: np.ndarray = field(default_factory=lambda: np.empty(0))
+    mean_count: np.ndarray = field(default_factory=lambda: np.empty(0))
+    residual: np.ndarray = field(default_factory=lambda: np.empty(0))
+    standard_error: np.ndarray = field(default_factory=lambda: np.empty(0))
+    direction: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int8))
+    temperature: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True, kw_only=True)
 class ScaleFit:
     """Calibration of one gyro: rate = sign · (count - bias) · scale.
 
@@ -42,8 +58,7 @@ class ScaleFit:
     floor_ppm        : what a perfectly linear gyro would show, median
     figures          : the findings of this test by the names of figures.FIGURES; empty where nominal
     full_scale deg/s; temperature_c mean of the test, NaN without a thermometer
-    rate, mean_count, residual, standard_error, direction, temperature [P] : the points of the fit; deg/s, counts, deg/s
-                       (output - table), deg/s, 1 up -1 down 0 none, °C
+    points           : of the fit; none where nominal
     """
 
     gyro: str
@@ -56,24 +71,28 @@ class ScaleFit:
     bias_high: float
     nonlinearity_ppm: float = math.nan
     floor_ppm: float = math.nan
-    rate: np.ndarray = field(default_factory=lambda: np.empty(0))
-    mean_count: np.ndarray = field(default_factory=lambda: np.empty(0))
-    residual: np.ndarray = field(default_factory=lambda: np.empty(0))
     note: str = ""
     scale_error: float = math.nan
     bias_error: float = math.nan
     full_scale: float = math.nan
     temperature_c: float = math.nan
     figures: dict[str, Finding] = field(default_factory=dict)
-    standard_error: np.ndarray = field(default_factory=lambda: np.empty(0))
-    direction: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int8))
-    temperature: np.ndarray = field(default_factory=lambda: np.empty(0))
+    points: FittedPoints = field(default_factory=FittedPoints)
 
 
 def nominal_fit(gyro: GyroNominal, note: str = "nominal scale: no calibration recording") -> ScaleFit:
     """The board's nominal values as a calibration, marked as such."""
-    nothing = math.nan
-    return ScaleFit(gyro.name, "nominal", gyro.scale, nothing, nothing, gyro.bias, nothing, nothing, note=note)
+    return ScaleFit(
+        gyro=gyro.name,
+        source="nominal",
+        scale=gyro.scale,
+        scale_low=math.nan,
+        scale_high=math.nan,
+        bias=gyro.bias,
+        bias_low=math.nan,
+        bias_high=math.nan,
+        note=note,
+    )
 
 
 def fit_scale_factor(
@@ -167,15 +186,26 @@ def _scale_fit(
     seen = np.abs(response.seen_bend @ visits.count).max() * scale / full_scale
     error = means.standard_error[usable, column] * scale
     warmth = means.temperature[usable, column]
-    floor = figures["nonlinearity_full_scale"].floor
+    residual = gyro.sign * scale * (visits.count - bias) - visits.rate - earth
     return ScaleFit(
-        gyro.name, "measured", scale, ends[0], ends[1], bias, bias - bias_half, bias + bias_half,
-        float(units.parts_per_million(seen)), floor, visits.rate, visits.count,
-        gyro.sign * scale * (visits.count - bias) - visits.rate - earth,
-        _note(response, scale, gyro, full_scale, error, figures["nonlinearity_full_scale"]),
-        fit.standard_error(response.slope) / slope**2, fit.standard_error(at_rest), full_scale, float(np.mean(warmth)),
-        figures, error, visits.direction, warmth,
-    )  # fmt: skip
+        gyro=gyro.name,
+        source="measured",
+        scale=scale,
+        scale_low=ends[0],
+        scale_high=ends[1],
+        scale_error=fit.standard_error(response.slope) / slope**2,
+        bias=bias,
+        bias_low=bias - bias_half,
+        bias_high=bias + bias_half,
+        bias_error=fit.standard_error(at_rest),
+        nonlinearity_ppm=float(units.parts_per_million(seen)),
+        floor_ppm=figures["nonlinearity_full_scale"].floor,
+        note=_note(response, scale, gyro, full_scale, error, figures["nonlinearity_full_scale"]),
+        full_scale=full_scale,
+        temperature_c=float(np.mean(warmth)),
+        figures=figures,
+        points=FittedPoints(visits.rate, visits.count, residual, error, visits.direction, warmth),
+    )
 
 
 def _note(

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 DRAWS = 2000
 SEED = 1431
 BISECTIONS = 16  # to 1e-5 of the range, far below what 2000 draws resolve
@@ -13,14 +15,16 @@ BISECTIONS = 16  # to 1e-5 of the range, far below what 2000 draws resolve
 Size = Callable[[np.ndarray], np.ndarray]  # [J, ...] → [...]: a norm
 
 
-def largest(values: np.ndarray) -> np.ndarray:
+def largest(values: Floats) -> Floats:
     """Largest |value| along the first axis."""
-    return np.abs(values).max(axis=0)
+    sizes: Floats = np.abs(values).max(axis=0)
+    return sizes
 
 
-def root_mean_square(values: np.ndarray) -> np.ndarray:
+def root_mean_square(values: Floats) -> Floats:
     """Root of the mean square along the first axis."""
-    return np.sqrt(np.mean(values**2, axis=0))
+    sizes: Floats = np.sqrt(np.mean(values**2, axis=0))
+    return sizes
 
 
 def noise_draws(combinations: np.ndarray, covariance: np.ndarray) -> np.ndarray:

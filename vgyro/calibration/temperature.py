@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro import units
+from vgyro.arrays import Floats
 from vgyro.calibration.convert import to_rates
 from vgyro.calibration.figures import VALUE, Finding, not_measured, signed
 from vgyro.calibration.wandering import Errors
@@ -33,7 +34,7 @@ class Compensation:
     scale_slope: float
     bias: tuple[float, float, float, float]
 
-    def bias_at(self, temperature: np.ndarray) -> np.ndarray:
+    def bias_at(self, temperature: Floats) -> Floats:
         """Counts at temperatures [T], °C."""
         return np.polynomial.polynomial.polyval(self._apart(temperature), self.bias)
 
@@ -48,8 +49,9 @@ class Compensation:
         """
         return replace(self, bias=(bias, *self.bias[1:]))
 
-    def _apart(self, temperature: np.ndarray) -> np.ndarray:
-        return np.clip(np.asarray(temperature, dtype=float), self.low_c, self.high_c) - self.reference_c
+    def _apart(self, temperature: Floats) -> Floats:
+        apart: Floats = np.clip(np.asarray(temperature, dtype=float), self.low_c, self.high_c) - self.reference_c
+        return apart
 
 
 def compensate(

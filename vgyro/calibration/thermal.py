@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import units
+from vgyro.arrays import Floats
 from vgyro.calibration.figures import Finding, not_measured, signed
 from vgyro.calibration.wandering import Errors, LinearFit, average_fits
 from vgyro.errors import TooShort
@@ -194,12 +195,13 @@ def _evidence(fits: list[LinearFit], powers: np.ndarray, bias: np.ndarray) -> tu
     return tuple(found)
 
 
-def _line_of(fit: LinearFit, temperature: np.ndarray, reference: float, span: float) -> np.ndarray:
+def _line_of(fit: LinearFit, temperature: Floats, reference: float, span: float) -> Floats:
     """Combination of the coefficients that is the slope, counts/K, of the straight line through the curve."""
     grid = np.linspace(temperature.min(), temperature.max(), GRID)
     curve = np.vander((grid - reference) / span, len(fit.estimate), increasing=True)
     apart = grid - grid.mean()
-    return apart @ curve / (apart @ apart)
+    line: Floats = apart @ curve / (apart @ apart)
+    return line
 
 
 def _note(order: int, temperature: np.ndarray, time: np.ndarray | None) -> str:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 SHARES = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # flicker, and random walk, over the white variance of one value
 SEED = 1431
 BISECTIONS = 50
@@ -51,14 +53,15 @@ class LinearFit:
         """Of combination · coefficients."""
         return float(np.sqrt(max(combination @ self.covariance @ combination, 0.0)))
 
-    def draws(self, combinations: np.ndarray, number: int) -> np.ndarray:
+    def draws(self, combinations: Floats, number: int) -> Floats:
         """Errors of combinations [J, p] · coefficients: [J, number], the same for the same fit."""
         generator = np.random.default_rng(SEED)
         shape = generator.choice(len(self.share), size=number, p=self.share)
         unit = generator.standard_normal((number, len(self.estimate)))
         unit *= np.sqrt(self.freedom / generator.chisquare(self.freedom, number))[:, None]
         moved = self.centre[shape] - self.estimate + np.einsum("nqr,nr->nq", self.root[shape], unit)
-        return combinations @ moved.T
+        draws: Floats = combinations @ moved.T
+        return draws
 
     def _parts(self, combination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Middle, from the estimate, and spread of each part of the mixture for a combination: [G], [G]."""
@@ -163,20 +166,21 @@ def average_fits(fits: list[LinearFit], evidence: np.ndarray) -> LinearFit:
     )
 
 
-def _about_mean(shape: np.ndarray) -> np.ndarray:
+def _about_mean(shape: Floats) -> Floats:
     """The covariance [P, P] of a wander about its own mean over the values; the mean as if they were independent."""
     centred = shape - shape.mean(axis=0) - shape.mean(axis=1)[:, None] + shape.mean()
-    return centred + np.trace(centred) / len(shape) ** 2
+    shape_about_mean: Floats = centred + np.trace(centred) / len(shape) ** 2
+    return shape_about_mean
 
 
-def flicker_shape(time: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+def flicker_shape(time: Floats, seconds: Floats) -> Floats:
     """Covariance [P, P] of means of flicker noise, but for the factor B²/π and for a constant.
 
     Flicker of the two-sided density B²/(2πf) has the covariance (B²/π)·ln(1/lag) but for a constant. Averaged over two
     stretches by integrating twice: ∬ ln x = x²/2 ln x - 3x²/4.
     """
 
-    def twice(lag: np.ndarray) -> np.ndarray:
+    def twice(lag: Floats) -> Floats:
         size = np.maximum(np.abs(lag), np.finfo(float).tiny)
         return size**2 / 2 * np.log(size) - 0.75 * size**2
 
@@ -187,7 +191,7 @@ def flicker_shape(time: np.ndarray, seconds: np.ndarray) -> np.ndarray:
     return -whole / (seconds[:, None] * seconds[None, :])
 
 
-def walk_shape(time: np.ndarray) -> np.ndarray:
+def walk_shape(time: Floats) -> Floats:
     """Covariance [P, P] of a random walk, but for the factor K²·span/2 and for a constant: -lag / span."""
     lag = np.abs(time[:, None] - time[None, :])
     return -lag / max(float(lag.max()), np.finfo(float).tiny)

@@ -26,7 +26,7 @@ from vgyro.config import CalibrationOptions, IntegrityOptions, RestOptions
 from vgyro.dataset import AT_REST, FileReference, Manifest, PlateauReference, Recording, values_of
 from vgyro.errors import VgyroError
 from vgyro.log import LogArray
-from vgyro.storage.decode import open_recording
+from vgyro.storage.decode import ReaderOptions, open_recording
 from vgyro.storage.dumps.diagnose import diagnose
 from vgyro.storage.dumps.sniff import probe
 from vgyro.storage.inputs import data_files
@@ -117,7 +117,9 @@ def read_head(
     paths: list[Path], recording: Recording, board: Board, boards: Path, array: LogArray | None = None
 ) -> DataHead:
     """Read a recording, up to MOST_VALUES.  raises : DataError, ConfigError"""
-    reader = open_recording(paths, recording, board, IntegrityOptions(), boards=boards, array=array)
+    reader = open_recording(
+        paths, recording, board, IntegrityOptions(), array=array, reading=ReaderOptions(boards=boards)
+    )
     most = max(FEWEST_ROWS, MOST_VALUES // len(board.gyros))
     columns, times, rows = [], [], 0
     fields = [gyro.field for gyro in board.gyros]

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     """Decode, print, return the exit code."""
     from vgyro.config import IntegrityOptions
     from vgyro.dataset import Recording
-    from vgyro.storage.decode import open_recording
+    from vgyro.storage.decode import ReaderOptions, open_recording
     from vgyro.storage.inputs import read_board
     from vgyro.storage.integrity import Refused
 
@@ -56,7 +56,9 @@ def run(options: argparse.Namespace) -> int:
 
         board = best_board(options.dumps[0], options.boards)[0]
     recording = Recording(name="dump", kind="free", files=tuple(map(str, options.dumps)))
-    reader = open_recording(options.dumps, recording, board, IntegrityOptions(), boards=options.boards)
+    reader = open_recording(
+        options.dumps, recording, board, IntegrityOptions(), reading=ReaderOptions(boards=options.boards)
+    )
     try:
         read_all(reader, options.dumps, board, options.out)
     except Refused as refused:

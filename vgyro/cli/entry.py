@@ -101,7 +101,8 @@ def _run(given: list[str]) -> int:
     )
     module.add_arguments(parser)
     options = _parse(parser, rest)
-    return module.run(options)
+    code: int = module.run(options)
+    return code
 
 
 def _parse(parser: CommandParser, rest: list[str]) -> argparse.Namespace:

@@ -142,7 +142,7 @@ def target_of(options: argparse.Namespace, must_exist: bool = False) -> Path:
     if not DATASET_NAME.fullmatch(name) or name in RESERVED:
         what = f"{name!r} cannot be the name of a data set"
         raise UsageError(what, None, f"give letters, digits, - and _ by --name, and none of {', '.join(RESERVED)}")
-    target = options.raw / name / MANIFEST
+    target: Path = options.raw / name / MANIFEST
     if must_exist:
         if not target.is_file():
             raise UsageError("there is no such data set", str(target), "name its files, too")

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vgyro.arrays import Ints
+
 if TYPE_CHECKING:
     from vgyro.board import Checksum
 
@@ -57,7 +59,7 @@ def _byte_table(rule: Checksum) -> np.ndarray:
     return np.array(table, dtype=np.uint64)
 
 
-def _advance(register: np.ndarray, table: np.ndarray, rule: Checksum) -> np.ndarray:
+def _advance(register: Ints, table: Ints, rule: Checksum) -> Ints:
     """Registers after one more zero byte, uint64 [n]."""
     if rule.reflected:
         return (register >> np.uint64(8)) ^ table[(register & np.uint64(0xFF)).astype(np.intp)]

@@ -6,10 +6,12 @@ import itertools
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 PIECE = 1 << 20
 
 
-def nnls_weights(H: np.ndarray) -> np.ndarray:
+def nnls_weights(H: Floats) -> Floats:
     """Minimum-variance weights as non-negative least squares.
 
     H       : array [N, N], symmetric, positive definite
@@ -24,7 +26,8 @@ def nnls_weights(H: np.ndarray) -> np.ndarray:
     root = np.linalg.cholesky(scaled)
     target = solve_triangular(root, np.ones(len(H)), lower=True)
     solution, _ = nnls(root.T, target)
-    return solution / solution.sum()
+    weights: Floats = solution / solution.sum()
+    return weights
 
 
 def textbook_allan_deviation(rate: np.ndarray, rate_hz: float, tau: float, segment: np.ndarray | None = None) -> float:

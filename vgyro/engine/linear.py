@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,10 +65,17 @@ def _bordered(matrices: np.ndarray, corner: float) -> np.ndarray:
     return wide
 
 
-def checked(
-    z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, StateSpace]:
-    """z [T], r [1] or [T], regime [T] uint8 or [0], and the whole model.
+class CheckedSeries(NamedTuple):
+    """z [T], r [1] or [T], regime [T] uint8 or [0], and the whole model."""
+
+    z: np.ndarray
+    r: np.ndarray
+    regime: np.ndarray
+    model: StateSpace
+
+
+def checked(z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None) -> CheckedSeries:
+    """A series as the engines take it.
 
     raises : DataError for shapes that do not fit; EngineError that names the first sample whose r is not above 0 (it
              may be infinite), or whose z is not finite though r is
@@ -88,4 +96,4 @@ def checked(
     if not usable.all():
         raise EngineError("the variance r is not above zero", f"sample {int(np.argmin(usable))}", "infinite: no data")
     refuse_broken("rate", z if np.isfinite(r).all() else np.where(np.isinf(r), 0.0, z))
-    return z, r, flags, whole
+    return CheckedSeries(z, r, flags, whole)

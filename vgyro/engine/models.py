@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -128,6 +129,32 @@ class DccWindows:
     log_likelihood_ccc: np.ndarray
     statistic: np.ndarray
     status: np.ndarray
+
+
+class DccModel(NamedTuple):
+    """GARCH(1,1) margins and DCC(1,1) of N series.
+
+    omega (deg/s)², alpha, beta [N];  a, b : of DCC, 0 for a constant correlation;  target : S [N, N]
+    """
+
+    omega: np.ndarray
+    alpha: np.ndarray
+    beta: np.ndarray
+    a: float
+    b: float
+    target: np.ndarray
+
+
+class LossyDifferences(NamedTuple):
+    """Differences of means over samples some of which are lost, at M averaging factors.
+
+    sums [M] of their squares, (deg/s)²; excess [M]; counts [M]; possible [M], as many as there were without a loss
+    """
+
+    sums: np.ndarray
+    excess: np.ndarray
+    counts: np.ndarray
+    possible: np.ndarray
 
 
 @dataclass(frozen=True)

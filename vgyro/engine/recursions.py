@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 
 def garch_variance(
     r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, start: np.ndarray | None = None
@@ -30,9 +32,10 @@ def garch_variance(
     return np.stack(columns, axis=1) if columns else driven
 
 
-def garch_log_likelihood(r: np.ndarray, variance: np.ndarray) -> np.ndarray:
+def garch_log_likelihood(r: Floats, variance: Floats) -> Floats:
     """Gaussian log-likelihood of each series, [N]: -½Σ(log 2π + log h + e²/h)."""
-    return -0.5 * np.sum(np.log(2 * np.pi) + np.log(variance) + np.square(r) / variance, axis=0)
+    likelihood: Floats = -0.5 * np.sum(np.log(2 * np.pi) + np.log(variance) + np.square(r) / variance, axis=0)
+    return likelihood
 
 
 def correlation_target(z: np.ndarray) -> np.ndarray:
@@ -40,7 +43,7 @@ def correlation_target(z: np.ndarray) -> np.ndarray:
     return unit_diagonal(z.T @ z / len(z))
 
 
-def unit_diagonal(matrix: np.ndarray) -> np.ndarray:
+def unit_diagonal(matrix: Floats) -> Floats:
     """diag(M)^-½ M diag(M)^-½ of [..., N, N]."""
     scale = 1 / np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
     scaled = matrix * scale[..., :, None] * scale[..., None, :]
@@ -49,7 +52,7 @@ def unit_diagonal(matrix: np.ndarray) -> np.ndarray:
     return scaled
 
 
-def dcc_q(z: np.ndarray, a: float, b: float, target: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
+def dcc_q(z: Floats, a: float, b: float, target: Floats, start: Floats | None = None) -> Floats:
     """Q_t = (1-a-b)S + a z_{t-1}z'_{t-1} + b Q_{t-1}, [T, N, N]; Q_1 = start, by default S.
 
     Engle (2002); Liu et al. (2015), eq. 4.
@@ -59,7 +62,8 @@ def dcc_q(z: np.ndarray, a: float, b: float, target: np.ndarray, start: np.ndarr
     driven = np.empty((*z.shape, z.shape[1]))
     driven[0] = 0.0 if start is None else start - target
     driven[1:] = a * (z[:-1, :, None] * z[:-1, None, :] - target)
-    return target + lfilter([1.0], [1.0, -b], driven, axis=0)
+    q: Floats = target + lfilter([1.0], [1.0, -b], driven, axis=0)
+    return q
 
 
 def dcc_correlation(
@@ -76,7 +80,7 @@ def dcc_correlation(
     return unit_diagonal(dcc_q(z, a, b, target, start))
 
 
-def dcc_log_likelihood(z: np.ndarray, a: float, b: float, target: np.ndarray) -> np.ndarray:
+def dcc_log_likelihood(z: Floats, a: float, b: float, target: Floats) -> Floats:
     """Each sample's share of L_c, [T]: -½(log|R| + z'R⁻¹z - z'z).
 
     raises : numpy.linalg.LinAlgError where some Q_t is not positive definite
@@ -87,7 +91,8 @@ def dcc_log_likelihood(z: np.ndarray, a: float, b: float, target: np.ndarray) ->
     lower = np.linalg.cholesky(q)
     scaled = np.linalg.solve(lower, (np.sqrt(diagonal) * z)[..., None])[..., 0]
     log_det = 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1) - np.log(diagonal).sum(axis=1)
-    return -0.5 * (log_det + np.square(scaled).sum(axis=1) - np.square(z).sum(axis=1))
+    likelihood: Floats = -0.5 * (log_det + np.square(scaled).sum(axis=1) - np.square(z).sum(axis=1))
+    return likelihood
 
 
 def dcc_score(z: np.ndarray, a: float, b: float, target: np.ndarray) -> tuple[float, np.ndarray]:

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.errors import DataError
 
 SINGULAR = 1e-10
@@ -28,10 +29,11 @@ def information(R: np.ndarray) -> float:
     return float(_solved(R).sum())
 
 
-def gain_direction(R: np.ndarray) -> np.ndarray:
+def gain_direction(R: Floats) -> Floats:
     """u = R⁻¹1/(1'R⁻¹1) [N]: how the gain is shared between the gyros, Σu = 1; not bounded to 0..1."""
     solved = _solved(R)
-    return solved / solved.sum()
+    direction: Floats = solved / solved.sum()
+    return direction
 
 
 def _solved(R: np.ndarray) -> np.ndarray:

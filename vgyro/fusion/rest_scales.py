@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.types import AllanScales, ArrayRates, CannotRun, FilterParameters
 
 LONGEST_TAU = 4  # the longest τ is a fourth of the longest stretch: half of it then holds differences
@@ -55,7 +56,7 @@ def angle_of(rate: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(rate - rate.mean())])
 
 
-def second_differences(angle: np.ndarray, factor: int, stride: int) -> np.ndarray:
+def second_differences(angle: Floats, factor: int, stride: int) -> Floats:
     """Differences of adjacent means over `factor` samples, `stride` samples from one to the next; none if too short."""
     number = len(angle) - 2 * factor
     if number <= 0:
@@ -64,5 +65,5 @@ def second_differences(angle: np.ndarray, factor: int, stride: int) -> np.ndarra
     return (last - 2.0 * middle + first) / factor
 
 
-def _covariance(differences: np.ndarray) -> np.ndarray:
+def _covariance(differences: Floats) -> Floats:
     return differences.T @ differences / (2.0 * len(differences))

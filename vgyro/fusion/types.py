@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.config import MOTION_MODELS, FusionOptions, MotionModel, Switch
 from vgyro.errors import DataError
 from vgyro.fusion.blocks import SampleWeights
@@ -107,9 +108,10 @@ class ArrayNoise:
     temperature: TemperatureAtRest | None = None
 
     @property
-    def R(self) -> np.ndarray:
+    def R(self) -> Floats:
         """Continuous noise covariance [N, N], (deg/s)²/Hz: arw_i · arw_j · correlation_ij."""
-        return np.outer(self.arw, self.arw) * self.correlation
+        R: Floats = np.outer(self.arw, self.arw) * self.correlation
+        return R
 
     def of(self, gyros: Sequence[int]) -> ArrayNoise:
         """The noise of some gyros, by their places."""
@@ -178,7 +180,8 @@ class ArrayRates:
         """What `make` returns, made once: for results that several methods need. A copy with other rates has none."""
         if key not in self._made:
             self._made[key] = make()
-        return self._made[key]
+        made: T = self._made[key]
+        return made
 
     def part(self, samples: slice) -> ArrayRates:
         """Some of the samples, first to last - 1."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats
 from vgyro.engine.covariance import usable as usable
 from vgyro.errors import DataError, EngineError
 
 
-def min_variance_weights(H: np.ndarray, engine: str = "native") -> np.ndarray:
+def min_variance_weights(H: Floats, engine: str = "native") -> Floats:
     """Weights of the combination with the smallest variance: min w'Hw, Σw = 1, 0 ≤ w ≤ 1.
 
     H       : array [..., N, N], covariance of the N gyros in any unit; symmetric, positive definite
@@ -30,7 +31,8 @@ def min_variance_weights(H: np.ndarray, engine: str = "native") -> np.ndarray:
     bad = np.flatnonzero(np.isnan(weights[:, 0]))
     if len(bad):
         _refuse(matrices, bad, H.shape[:-2])
-    return weights.reshape(H.shape[:-1])
+    found: Floats = weights.reshape(H.shape[:-1])
+    return found
 
 
 def _refuse(matrices: np.ndarray, bad: np.ndarray, leading: tuple[int, ...]) -> None:

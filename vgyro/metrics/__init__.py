@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from vgyro.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from vgyro.figure import Figure
     from vgyro.metrics.allan.coefficients import Coefficient, NoiseCoefficients, model_deviation, noise_coefficients
     from vgyro.metrics.allan.covariance import CrossAllan, cross_allan
     from vgyro.metrics.allan.deviation import AllanCurve, allan_deviation, averaging_factors, read_curve, stretches
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from vgyro.metrics.correlation import Correlation, correlation_matrix
     from vgyro.metrics.dynamic.errors import DynamicErrors, dynamic_errors
     from vgyro.metrics.equal_bandwidth import Equaliser, LowPass, common_bandwidth, run_back
-    from vgyro.metrics.figures import FIGURES, Figure, Reading
+    from vgyro.metrics.figures import FIGURES, Reading
     from vgyro.metrics.improvement import improvement_by_draws, improvement_factor, improvement_of_deviation
     from vgyro.metrics.intervals.bootstrap import Resampled, Units, block_length, make_units, resample
     from vgyro.metrics.outliers import find_outliers

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.metrics.allan.coefficients import Coefficient
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.sampling import Sampling
@@ -174,12 +175,13 @@ def _freedom(unit: np.ndarray, units: int) -> float:
     return max(float(means.sum()) ** 2 / float(means @ means), 1.0)
 
 
-def _not_negative(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _not_negative(gram: Floats, right: Floats) -> Floats:
     """Least squares of two coefficients, neither below zero."""
     from scipy.optimize import nnls
 
     factor = np.linalg.cholesky(gram)
-    return nnls(factor.T, np.linalg.solve(factor, right))[0]
+    solution: Floats = nnls(factor.T, np.linalg.solve(factor, right))[0]
+    return solution
 
 
 def _white(lag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.metrics.allan.deviation import edges_of
 
 LARGEST_LAG_SHARE = 4
@@ -131,7 +132,7 @@ def autocorrelation(centred: np.ndarray, lags: int) -> np.ndarray:
     return function / function[0] if lags and function[0] > 0 else np.zeros(lags)
 
 
-def lagged_products(first: np.ndarray, second: np.ndarray, lags: int) -> np.ndarray:
+def lagged_products(first: Floats, second: Floats, lags: int) -> Floats:
     """Σ_t first[t] second[t + k] for k = 0 … lags - 1, as far as there is a second[t + k].
 
     By FFT; series much longer than the lags are cut into parts of `first`, each with what it meets of `second`.
@@ -151,7 +152,8 @@ def lagged_products(first: np.ndarray, second: np.ndarray, lags: int) -> np.ndar
         spectrum += transform.sum(axis=0)
     for start in range(whole * part, number, part):
         spectrum += rfft(first[start : start + part], size).conj() * rfft(second[start : start + part + lags], size)
-    return irfft(spectrum, size)[:lags]
+    products: Floats = irfft(spectrum, size)[:lags]
+    return products
 
 
 def correlation_length(function: np.ndarray) -> float:

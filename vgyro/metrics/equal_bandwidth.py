@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats
 from vgyro.metrics.allan.deviation import stretches
 
 SETTLED = 8.0  # time constants after which a start is forgotten: e^-8 of it is left, e^-16 of its variance
@@ -128,10 +129,11 @@ class Equaliser:
         raw[1:] /= 1 - keep
         return raw
 
-    def _put_on(self, values: np.ndarray, bandwidth_hz: float) -> np.ndarray:
+    def _put_on(self, values: Floats, bandwidth_hz: float) -> Floats:
         keep = self._keep(bandwidth_hz)
         recursion = engines.get(self.engine).kalman.low_pass
-        return recursion(values, keep, 1 - keep, float(values[0]))
+        filtered: Floats = recursion(values, keep, 1 - keep, float(values[0]))
+        return filtered
 
     def _keep(self, bandwidth_hz: float) -> float:
         return math.exp(-2 * math.pi * bandwidth_hz / self.rate_hz)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats, Ints
 from vgyro.runs import run_starts
 
 NORMAL_MAD = 0.6744897501960817  # median of |z| of a normal z
@@ -93,7 +94,7 @@ def _suspects(rate: np.ndarray, length: int, screen: float, floor: float) -> tup
     return places, np.repeat(scale, 2 * REACH + 1)[inside][first_of]
 
 
-def _block_medians(bend: np.ndarray, length: int) -> np.ndarray:
+def _block_medians(bend: Floats, length: int) -> Floats:
     """Median of each block; samples of an incomplete last one belong to the block before."""
     blocks = len(bend) // length
     if blocks == 0:
@@ -101,7 +102,7 @@ def _block_medians(bend: np.ndarray, length: int) -> np.ndarray:
     return np.median(bend[: blocks * length].reshape(blocks, length), axis=1)
 
 
-def _far_off(rate: np.ndarray, places: np.ndarray, scale: np.ndarray, threshold: float, floor: float) -> np.ndarray:
+def _far_off(rate: Floats, places: Ints, scale: Floats, threshold: float, floor: float) -> Bools:
     """Which of `places` [K] lie far off the levels before and after, by the scale there and by that of their sides."""
     last = len(rate) - 1
     distance, spread = [], []
@@ -122,7 +123,8 @@ def _far_off(rate: np.ndarray, places: np.ndarray, scale: np.ndarray, threshold:
     around = _quantile(np.hstack(spread), NORMAL[0])
     near = np.maximum(*(_quantile(one, NORMAL[1]) for one in spread))
     limit = np.maximum(scale, np.maximum(AROUND * around, NEAR * np.maximum(near, floor)))
-    return nearest > threshold * limit
+    far: Bools = nearest > threshold * limit
+    return far
 
 
 def _quantile(spread: np.ndarray, normal: tuple[float, float]) -> np.ndarray:

@@ -82,7 +82,7 @@ def with_single(rows: Iterable[dict[str, Any]], gyros: Sequence[str]) -> list[di
     A metric that one gyro lacks gets no such row. The metric `mean` is averaged as a magnitude (L, Table 3).
     """
     rows = list(rows)
-    groups: dict[tuple, dict[str, Row]] = {}
+    groups: dict[tuple[Any, ...], dict[str, Row]] = {}
     for row in rows:
         if row["method"] in gyros:
             key = tuple(row.get(name) for name in ("recording", "axis", "metric", "unit"))

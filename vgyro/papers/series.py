@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,22 +26,27 @@ class SeriesFigures:
     factors: Rows
 
 
+class SlowSeries(NamedTuple):
+    """Block means of single gyros and of methods, which come after them.
+
+    names  : (method, definition) of each series, (gyro, "") for a single gyro
+    values : [M, S] deg/s at rate_hz;  stretch : [M] number of the run without a gap
+    """
+
+    names: Sequence[Name]
+    values: np.ndarray
+    stretch: np.ndarray
+    rate_hz: float
+
+
 def series_figures(
-    place: Mapping[str, str],
-    names: Sequence[Name],
-    gyros: int,
-    values: np.ndarray,
-    stretch: np.ndarray,
-    rate_hz: float,
-    options: MetricsOptions,
-    engine: str = "native",
+    place: Mapping[str, str], series: SlowSeries, gyros: int, options: MetricsOptions, engine: str = "native"
 ) -> SeriesFigures:
     """Figures of block means, with limits, and improvement factors over the single gyros (L, eq. 18).
 
-    place  : columns that every row gets;  names : (method, definition) of each series, (gyro, "") for a single gyro;
-             the first `gyros` of them are the single gyros
-    values : [M, S] deg/s at rate_hz;  stretch : [M] number of the run without a gap
+    place : columns that every row gets;  gyros : how many of the series are single gyros
     """
+    names, values, stretch, rate_hz = series
     sampling = Sampling.of(rate_hz, stretch)
     found = static_figures(values.T, sampling, gyros, [LowPass()] * len(names), options, engine)
     metrics = [
@@ -71,13 +76,7 @@ def extremes(rows: Rows, gyros: Sequence[str], faulty: str) -> dict[str, Name]:
 
 
 def paired_ratios(
-    place: Mapping[str, str],
-    names: Sequence[Name],
-    values: np.ndarray,
-    stretch: np.ndarray,
-    rate_hz: float,
-    over: Mapping[str, Name],
-    options: MetricsOptions,
+    place: Mapping[str, str], series: SlowSeries, over: Mapping[str, Name], options: MetricsOptions
 ) -> Rows:
     """Mean (as a magnitude), 1σ and ARW at 1 s of every series over those of a few, with limits.
 
@@ -86,7 +85,8 @@ def paired_ratios(
     are percentiles moved by a factor to have the ratio itself as their median: blocks are shorter than the drift and
     lose a part of it. Bias drift is not there: the minimum of a curve cannot be resampled by blocks.
     """
-    sums = make_units(values, rate_hz, stretch)
+    names = list(series.names)
+    sums = make_units(series.values, series.rate_hz, series.stretch)
     drawn = resample(sums, options.bootstrap, options.seed)
     replicates = dict(zip(PAIRED, (np.abs(drawn.mean), drawn.sigma, drawn.adev_1s), strict=True))
     tails = [(1 - options.confidence) / 2, (1 + options.confidence) / 2]
@@ -95,7 +95,7 @@ def paired_ratios(
     figures = dict(zip(PAIRED, (np.abs(whole.mean[0]), whole.sigma[0], whole.adev_1s[0]), strict=True))
     rows: Rows = []
     for label, name in over.items():
-        to = list(names).index(name)
+        to = names.index(name)
         for index, (method, definition) in enumerate(names):
             for metric in PAIRED:
                 drawn_ratio = replicates[metric][:, index] / replicates[metric][:, to]

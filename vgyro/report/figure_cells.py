@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from vgyro.figure import Figure
 from vgyro.report.model import Value
 from vgyro.report.numbers import MISSING, significant
@@ -63,12 +65,12 @@ def figure_cell(
     if "not_shown" in value.flags:
         return Cell(f"< {significant(value.high, 2)}", tone="muted", hint=value.note)
     insignificant = "not_significant" in value.flags
-    return number_cell(
+    cell = number_cell(
         value.value,
         value.low,
         value.high,
         tone="muted" if insignificant else "best" if best else "",
         notes=() if insignificant else notes.number(remarks(value.note)),
         hint=value.note,
-        mark=BAND_LIMITED if limited or says_limited(value) else "",
     )
+    return replace(cell, mark=BAND_LIMITED) if limited or says_limited(value) else cell

@@ -42,7 +42,6 @@ def render_page(
     subtitle: str | Markup = "",
     home: str = "index.html",
     contents: bool = True,
-    footer: str | Markup = FOOTER,
 ) -> str:
     """A whole page as text.
 
@@ -58,7 +57,7 @@ def render_page(
     )
     return environment().get_template("page.html").render(
         title=title, sections=tuple(sections), simulated=simulated, subtitle=subtitle, home=home, contents=contents,
-        footer=footer, bokeh=_bokeh_script() if has_plots else "",
+        footer=FOOTER, bokeh=_bokeh_script() if has_plots else "",
     ) + "\n"  # fmt: skip
 
 

@@ -78,35 +78,50 @@ class Axis:
     scale: Scale = "linear"
 
 
-def curve_plot(
-    identifier: str,
-    title: str,
-    curves: Sequence[Curve],
-    x: Axis,
-    y: Axis,
-    *,
-    summary: str = "",
-    spans: Sequence[tuple[float, float]] = (),
-    levels: Sequence[float] = (),
-    lines: Sequence[float] = (),
-    height: int = 300,
-) -> Markup:
-    """A plot of curves, with a legend whose entries show and hide them.
+@dataclass(frozen=True)
+class PlotFrame:
+    """What stands about the curves of a plot.
 
-    identifier : anchor, unique in the page;  spans : stretches [start, stop] of x with a tinted ground
-    levels, lines : horizontal and vertical lines;  height : px;  the width is that of the page
+    identifier : anchor, unique in the page;  summary : small print beside the title
+    height     : px; the width is that of the page
     """
-    plot = _empty(x, y, height)
-    _mark_spans(plot, spans)
-    _mark_lines(plot, levels, "width")
-    _mark_lines(plot, lines, "height")
+
+    identifier: str
+    title: str
+    x: Axis
+    y: Axis
+    summary: str = ""
+    height: int = 300
+
+
+@dataclass(frozen=True)
+class PlotMarks:
+    """What is drawn behind the curves.
+
+    spans : stretches [start, stop] of x with a tinted ground;  levels, lines : horizontal and vertical lines
+    """
+
+    spans: Sequence[tuple[float, float]] = ()
+    levels: Sequence[float] = ()
+    lines: Sequence[float] = ()
+
+
+def curve_plot(frame: PlotFrame, curves: Sequence[Curve], marks: PlotMarks | None = None) -> Markup:
+    """A plot of curves, with a legend whose entries show and hide them."""
+    marks, x, y = marks or PlotMarks(), frame.x, frame.y
+    plot = _empty(x, y, frame.height)
+    _mark_spans(plot, marks.spans)
+    _mark_lines(plot, marks.levels, "width")
+    _mark_lines(plot, marks.lines, "height")
     sources = _sources(curves)
     order = sorted(range(len(curves)), key=lambda index: -curves[index].behind)
     drawn = [_draw(plot, curves[index], sources[index]) for index in order]
     _add_hover(plot, [one for one in drawn if one is not None], x, y)
-    item = {"json": _escaped(_as_json(plot, identifier)), "height": height}
+    item = {"json": _escaped(_as_json(plot, frame.identifier)), "height": frame.height}
     legend = _legend(curves) if len(curves) > 1 else ()
-    return macro("plot", identifier=identifier, title=title, summary=summary, item=item, legend=legend)
+    return macro(
+        "plot", identifier=frame.identifier, title=frame.title, summary=frame.summary, item=item, legend=legend
+    )
 
 
 def bar_plot(

@@ -73,11 +73,11 @@ class Notes:
 
 def number_cell(
     value: float, low: float = float("nan"), high: float = float("nan"), *, tone: Tone = "",
-    notes: tuple[int, ...] = (), hint: str = "", mark: str = "",
+    notes: tuple[int, ...] = (), hint: str = "",
 ) -> Cell:  # fmt: skip
     """A figure with its interval below it; a dash where it is missing (say why in `notes` or `hint`)."""
     text, interval = with_interval(value, low, high)
-    return Cell(text, interval, "muted" if text == MISSING else tone, None, notes, hint, mark)
+    return Cell(text, interval, "muted" if text == MISSING else tone, None, notes, hint)
 
 
 def render_table(

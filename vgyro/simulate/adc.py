@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.board import Board
 from vgyro.simulate.faults import Stretch
 from vgyro.simulate.serial.encode import type_limits
@@ -56,7 +57,7 @@ class AdcConverter:
         return counts
 
 
-def _digitise(exact: np.ndarray, kind: str, board: Board) -> np.ndarray:
+def _digitise(exact: Floats, kind: str, board: Board) -> Floats | Ints:
     if kind[0] == "f":
         return exact
     low, high = type_limits(kind)

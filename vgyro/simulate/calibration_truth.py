@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.board import Board, Gyro
 from vgyro.errors import DataError
 from vgyro.simulate.motion import plateaus_of
@@ -131,7 +132,8 @@ def _asymmetry(points: TruePoints) -> float:
     zero = _at_zero(points.rate)
     sides = ((points.rate > 0) | zero, (points.rate < 0) | zero)
     plus, minus = (np.polyfit(points.rate[side], points.between[side], 1)[0] for side in sides)
-    return (plus - minus) / ((plus + minus) / 2)
+    asymmetry: float = (plus - minus) / ((plus + minus) / 2)
+    return asymmetry
 
 
 def _hysteresis(points: TruePoints) -> float:
@@ -144,6 +146,6 @@ def _hysteresis(points: TruePoints) -> float:
     return max(widths, default=float("nan"))
 
 
-def _at_zero(rate: np.ndarray) -> np.ndarray:
+def _at_zero(rate: Floats) -> Bools:
     """The table stands: what is left is the Earth's rate."""
     return np.abs(rate) < 2 * deg_s(EARTH_RATE_DEG_H)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.dataset import Plateau
 from vgyro.simulate.twin import ConstantRate, Motion, RandomRate, RateTable, Rest, Sinusoid
 
@@ -44,7 +45,7 @@ def plateaus_of(motion: Motion) -> tuple[Plateau, ...]:
     )
 
 
-def _band_limited(motion: RandomRate, samples: int, rate_hz: float, generator: np.random.Generator) -> np.ndarray:
+def _band_limited(motion: RandomRate, samples: int, rate_hz: float, generator: np.random.Generator) -> Floats:
     """Gaussian noise, flat up to the bandwidth, nothing above; the s.d. is that of the process, not of the stretch."""
     from scipy.fft import irfft, next_fast_len, rfftfreq
 
@@ -54,15 +55,18 @@ def _band_limited(motion: RandomRate, samples: int, rate_hz: float, generator: n
     spectrum = np.zeros(frequency.size, dtype=complex)
     spectrum[inside] = generator.standard_normal(inside.sum()) + 1j * generator.standard_normal(inside.sum())
     spectrum *= motion.sd * length / (2.0 * np.sqrt(max(inside.sum(), 1)))
-    return irfft(spectrum, length)[:samples]
+    rate: Floats = irfft(spectrum, length)[:samples]
+    return rate
 
 
-def _table(motion: RateTable, time: np.ndarray) -> np.ndarray:
+def _table(motion: RateTable, time: Floats) -> Floats:
     """Half a cosine from one rate to the next during settle_s, then even; the table begins at rest."""
     step = motion.settle_s + motion.plateau_s
     rates = np.array([0.0, *motion.rates])
     index = np.minimum((time / step + 1e-9).astype(int), len(motion.rates) - 1)
     if motion.settle_s == 0:
-        return rates[index + 1]
+        rate: Floats = rates[index + 1]
+        return rate
     share = np.clip((time - index * step) / motion.settle_s, 0.0, 1.0)
-    return rates[index] + (rates[index + 1] - rates[index]) * 0.5 * (1.0 - np.cos(np.pi * share))
+    rate = rates[index] + (rates[index + 1] - rates[index]) * 0.5 * (1.0 - np.cos(np.pi * share))
+    return rate

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 BLOCK_HZ = 1.0
 PIECE = 1 << 18
 
@@ -105,7 +107,7 @@ class ModulatedWhite:
         return sd, factor
 
 
-def unit_flicker(samples: int, generator: np.random.Generator) -> np.ndarray:
+def unit_flicker(samples: int, generator: np.random.Generator) -> Floats:
     """Flicker noise with B = 1: two-sided density 1/(2πf); [T], mean zero over the stretch, in single precision.
 
     Independent normal Fourier coefficients of the right variance at every bin of a stretch twice as long, of which the
@@ -130,7 +132,7 @@ def unit_flicker(samples: int, generator: np.random.Generator) -> np.ndarray:
     spectrum[0] = 0.0
     if length % 2 == 0:
         spectrum[-1] = spectrum[-1].real * np.sqrt(2.0)
-    stretch = irfft(spectrum, length, overwrite_x=True)[:samples].copy()
+    stretch: Floats = irfft(spectrum, length, overwrite_x=True)[:samples].copy()
     stretch -= stretch.mean(dtype=np.float64)
     return stretch
 
@@ -159,12 +161,13 @@ class Pole:
         self._phi, self._numerator, self._steady = phi, numerator, steady
         self._state: np.ndarray | None = None
 
-    def next(self, values: np.ndarray) -> np.ndarray:
+    def next(self, values: Floats) -> Floats:
         """The next samples, [T, …]."""
         from scipy.signal import lfilter
 
         if self._state is None:
             self._state = (1.0 - self._numerator[0]) * values[:1] if self._steady else np.zeros_like(values[:1])
+        filtered: Floats
         filtered, self._state = lfilter(self._numerator, [1.0, -self._phi], values, axis=0, zi=self._state)
         return filtered
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.board import Board
 from vgyro.dataset import Plateau
 from vgyro.errors import DataError
@@ -261,7 +262,7 @@ class _Output:
         if pole is not None:
             self._poles = pole_of_motion(pole, rate_hz), pole_of_noise(pole, rate_hz)
 
-    def piece(self, reference: np.ndarray, white: White, faults: Faults, temperature: np.ndarray) -> np.ndarray:
+    def piece(self, reference: Floats, white: White, faults: Faults, temperature: Floats) -> Floats:
         """The next piece, [T, N]."""
         noise = white.noise * faults.noise_gain + faults.burst
         direction = self._direction.next(reference)
@@ -269,5 +270,7 @@ class _Output:
             reference, noise = self._poles[0].next(reference), self._poles[1].next(noise)
         rate = np.outer(reference + self._earth, self._seen)
         if self._transfer.ideal:
-            return rate + noise
-        return rate + noise + self._transfer.error(rate, direction, temperature)
+            piece: Floats = rate + noise
+            return piece
+        piece = rate + noise + self._transfer.error(rate, direction, temperature)
+        return piece

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.simulate.twin import GyroTruth, TemperatureTruth
 from vgyro.units import parts_per_million
 
@@ -39,7 +40,7 @@ class Transfer:
         """True if there is nothing to add."""
         return not any(map(np.any, (self._nonlinearity, self._asymmetry, self._hysteresis, self._slope)))
 
-    def error(self, rate: np.ndarray, direction: np.ndarray, temperature: np.ndarray) -> np.ndarray:
+    def error(self, rate: Floats, direction: Floats, temperature: Floats) -> Floats:
         """deg/s to add, [T, N].
 
         rate : [T, N], deg/s, seen by each gyro;  direction : [T], -1, 0 or 1;  temperature : [T], °C
@@ -48,7 +49,8 @@ class Transfer:
         bent = self._nonlinearity * (share**3 - CUBIC_SLOPE * share) / CUBIC_LARGEST
         loop = self._hysteresis / 2.0 * np.maximum(1.0 - share**2, 0.0) * direction[:, None]
         warm = np.outer(temperature - self._reference_c, self._slope)
-        return self._full_scale * (bent - loop) + self._asymmetry / 2.0 * np.abs(rate) + warm * rate
+        error: Floats = self._full_scale * (bent - loop) + self._asymmetry / 2.0 * np.abs(rate) + warm * rate
+        return error
 
 
 def _ratios(truths: Sequence[GyroTruth], key: str) -> np.ndarray:

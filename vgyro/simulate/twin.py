@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
@@ -68,7 +68,8 @@ class GyroTruth(StrictModel):
     def arw(self) -> float:
         """Angle random walk, deg/√h, given or implied by omega."""
         if self.garch is not None and self.garch.omega is not None:
-            return arw_deg_rt_h((self.garch.omega / (1 - self.garch.alpha - self.garch.beta)) ** 0.5)
+            deviation: float = arw_deg_rt_h((self.garch.omega / (1 - self.garch.alpha - self.garch.beta)) ** 0.5)
+            return deviation
         return self.arw_deg_rt_h or 0.0
 
     @model_validator(mode="after")
@@ -312,7 +313,7 @@ def _check_merged(twin: Twin, recording: TwinRecording, gyro: str) -> None:
 
 def truth_of(twin: Twin, recording: TwinRecording, gyro: str) -> GyroTruth:
     """The errors of one gyro in one recording: `all`, then the gyro, then the recording's own of both."""
-    merged: dict = {}
+    merged: dict[str, Any] = {}
     for gyros in (twin.gyros, recording.gyros):
         for name in (EVERY_GYRO, gyro):
             if name in gyros:

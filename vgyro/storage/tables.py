@@ -160,7 +160,8 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
     metadata = pq.read_schema(path).metadata or {}
     if METADATA_KEY not in metadata:
         raise DataError("not an artefact of vgyro", str(path), "run the stage that makes it again")
-    return json.loads(metadata[METADATA_KEY])
+    known: dict[str, Any] = json.loads(metadata[METADATA_KEY])
+    return known
 
 
 def read_columns(path: str | Path, columns: list[str] | None = None) -> dict[str, np.ndarray]:
@@ -251,7 +252,8 @@ def write_json(path: str | Path, record: Mapping[str, Any]) -> None:
 
 def read_json(path: str | Path) -> dict[str, Any]:
     """Read a JSON record."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))
+    content: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+    return content
 
 
 def write_text(path: str | Path, text: str) -> None:

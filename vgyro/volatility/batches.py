@@ -2,37 +2,46 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
+from vgyro.arrays import Floats, Ints
 from vgyro.config import Definition
 
 
-def window_batch(
-    values: np.ndarray,
-    starts: np.ndarray,
-    length: int,
-    ahead: int,
-    definition: Definition,
-    span: int = 15,
-    stretch_starts: np.ndarray | None = None,
-) -> np.ndarray:
+class WindowPlaces(NamedTuple):
+    """Where K windows lie in a series.
+
+    starts : [K] first sample of each window;  length : of each window
+    ahead  : samples after each window; beyond the end of the series its last sample is repeated
+    stretch_starts : [K] first sample of each window's stretch, for `difference`; None: starts
+    """
+
+    starts: Ints
+    length: int
+    ahead: int = 0
+    stretch_starts: Ints | None = None
+
+
+def window_batch(values: Floats, windows: WindowPlaces, definition: Definition, span: int = 15) -> Floats:
     """r_t of K windows and of `ahead` samples after each: window_residuals, window by window.
 
     values  : [m, N] deg/s, samples of the series; NaN where a gyro has no value, and so is r_t then
-    starts  : [K] first sample of each window in `values`;  length : of each window
-    ahead   : samples after each window; beyond the end of `values` the last sample is repeated
+    windows : their samples are counted in `values`
     span    : samples of the first-pass rate estimate of `residual`
-    stretch_starts : [K] first sample of each window's stretch in `values`, for `difference`; None: starts
     returns : [K, length + ahead, N] deg/s, of `level` perhaps a view of `values`; `difference` is NaN in the first
               sample of a stretch
     """
+    starts, length, ahead, stretch_starts = windows
     total = length + ahead
     block = _cut(values, starts, total)
     if definition == "level":
         return block
     if definition == "demeaned":
-        return block - block[:, :length].mean(axis=1, keepdims=True)
+        centred: Floats = block - block[:, :length].mean(axis=1, keepdims=True)
+        return centred
     if definition == "difference":
         r = np.empty(block.shape)
         np.subtract(block[:, 1:], block[:, :-1], out=r[:, 1:])
@@ -42,10 +51,11 @@ def window_batch(
     low, high = span_about(total, length, span // 2)
     median = _cut(median_of_gyros(values), starts, total)
     sums = np.concatenate([np.zeros((len(starts), 1)), np.cumsum(median, axis=1)], axis=1)
-    return block - ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
+    centred = block - ((sums[:, high + 1] - sums[:, low]) / (high + 1 - low))[:, :, None]
+    return centred
 
 
-def median_of_gyros(values: np.ndarray) -> np.ndarray:
+def median_of_gyros(values: Floats) -> Floats:
     """Median [m] over the gyros [m, N] that have a value; in no row all of them lack one."""
     if not np.isnan(values).any():
         return np.median(values, axis=1)
@@ -66,7 +76,7 @@ def fitted_batch(
     returns : [K, length, N] deg/s, or one sample fewer where there is no first difference; zero throughout for a gyro
               whose output does not change in the window
     """
-    r = window_batch(values, starts, length, 0, definition, span, stretch_starts)
+    r = window_batch(values, WindowPlaces(starts, length, 0, stretch_starts), definition, span)
     if definition == "difference" and len(r) and np.isnan(r[0, 0]).all():
         r = r[:, 1:]
     stuck = values[starts] == values[starts + length - 1]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine.models import (
     A_ZERO,
     B_ZERO,
@@ -146,6 +147,15 @@ def bekk_log_likelihood(r: np.ndarray, covariance: np.ndarray) -> float:
     return -0.5 * float(r.size * math.log(2 * math.pi) + log_det + np.square(white).sum())
 
 
+class _Slopes(NamedTuple):
+    """Cost, and its slopes in Ω [N, N], a [N] and b [N], Ω held fixed for the last two."""
+
+    cost: float
+    constant: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+
+
 @dataclass(frozen=True)
 class _Point:
     """Parameters, in units of each gyro's r.m.s.: Ω = DLL'D with D = diag √(1 - a² - b²).
@@ -158,12 +168,14 @@ class _Point:
     b: np.ndarray
 
     @property
-    def shrink(self) -> np.ndarray:
-        return np.sqrt(np.maximum(1 - self.a**2 - self.b**2, 0.0))
+    def shrink(self) -> Floats:
+        shrink: Floats = np.sqrt(np.maximum(1 - self.a**2 - self.b**2, 0.0))
+        return shrink
 
     @property
-    def constant(self) -> np.ndarray:
-        return np.outer(self.shrink, self.shrink) * (self.root @ self.root.T)
+    def constant(self) -> Floats:
+        constant: Floats = np.outer(self.shrink, self.shrink) * (self.root @ self.root.T)
+        return constant
 
 
 class _Likelihood:
@@ -181,8 +193,8 @@ class _Likelihood:
     def cost(self, point: _Point) -> float:
         return -bekk_log_likelihood(self.e, self.covariance(point)) / len(self.e)
 
-    def slopes(self, point: _Point) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Cost, and its slopes in Ω [N, N], a [N] and b [N], Ω held fixed for the last two."""
+    def slopes(self, point: _Point) -> _Slopes:
+        """The cost and its slopes."""
         samples, n = self.e.shape
         path = self._path(point)
         H = _full(path, n)
@@ -198,7 +210,7 @@ class _Likelihood:
             2 * _symmetric((felt * values).sum(axis=0), n) @ weight
             for values, weight in ((self._products, point.a), (before, point.b))
         )
-        return cost, _symmetric(felt.sum(axis=0), n), by_a, by_b
+        return _Slopes(cost, _symmetric(felt.sum(axis=0), n), by_a, by_b)
 
     def _path(self, point: _Point) -> np.ndarray:
         """H_t above and on the diagonal, [T, N(N+1)/2]."""
@@ -270,7 +282,7 @@ class _Coordinates:
     def _triangle(self) -> tuple[np.ndarray, np.ndarray]:
         return np.tril_indices(len(self.root))
 
-    def _size(self, x: np.ndarray) -> np.ndarray:
+    def _size(self, x: Floats) -> Floats:
         return np.sqrt(1 / (1 + np.exp(-x[: self.count])))
 
 
@@ -354,12 +366,13 @@ def _status(a: np.ndarray, b: np.ndarray, r: np.ndarray) -> str:
     return B_ZERO if (b**2 < BETA_NEAR_ZERO).any() else CONVERGED
 
 
-def _filtered(driven: np.ndarray, decay: np.ndarray) -> np.ndarray:
+def _filtered(driven: Floats, decay: Floats) -> Floats:
     """y_t = x_t + decay·y_{t-1} of each column of x [T, M]; decay [M]."""
     from scipy.signal import lfilter
 
     if (decay == decay[0]).all():
-        return lfilter([1.0], [1.0, -decay[0]], driven, axis=0)
+        filtered: Floats = lfilter([1.0], [1.0, -decay[0]], driven, axis=0)
+        return filtered
     columns = [lfilter([1.0], [1.0, -one], column) for one, column in zip(decay, driven.T, strict=True)]
     return np.stack(columns, axis=1)
 
@@ -372,5 +385,6 @@ def _full(packed: np.ndarray, n: int) -> np.ndarray:
     return packed[:, place]
 
 
-def _symmetric(packed: np.ndarray, n: int) -> np.ndarray:
-    return _full(packed[None], n)[0]
+def _symmetric(packed: Floats, n: int) -> Floats:
+    full: Floats = _full(packed[None], n)[0]
+    return full

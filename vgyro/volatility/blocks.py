@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.errors import ConfigError
 from vgyro.runs import run_starts
 
@@ -45,10 +46,11 @@ class Runs:
     lost: np.ndarray
     length: int
 
-    def slots(self, sample: np.ndarray) -> np.ndarray:
+    def slots(self, sample: Ints) -> Ints:
         """Slots from the first sample of the recording to each sample, were nothing lost but within the runs."""
         total = np.concatenate([[0], np.cumsum(self.lost)])
-        return sample + total[np.searchsorted(self.jump, sample, side="right")]
+        slots: Ints = sample + total[np.searchsorted(self.jump, sample, side="right")]
+        return slots
 
 
 class RunFinder:
@@ -153,7 +155,7 @@ class BlockMeans:
             filled[gyro] = np.where(mask, rate[gyro], 0.0)
         return [*filled, *there]
 
-    def _means(self, sums: np.ndarray, count: np.ndarray) -> np.ndarray:
+    def _means(self, sums: Floats, count: Ints) -> Floats:
         """Means [b, N] of blocks with `count` [b] samples; NaN where a gyro has too few values."""
         if not self._present:
             return sums / count[:, None]

@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+from vgyro.arrays import Floats
+from vgyro.engine.models import DccModel
+
 PERSISTENCE_MAX = 1.0 - 1e-6
 GRID_ALPHA = (0.0, 0.005, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32, 0.45, 0.65, 0.9)
 GRID_PERSISTENCE = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985, 0.993, 0.998)
@@ -57,7 +60,7 @@ def _cost_and_slope(point: np.ndarray, e: np.ndarray) -> tuple[float, np.ndarray
     return -float(values[0]), -(values[4:] - values[1:4]) / width
 
 
-def _log_likelihood(e: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _log_likelihood(e: Floats, points: Floats) -> Floats:
     """Log-likelihood of a series of mean square 1 at many points (ω, α + β, α/(α + β)) [P, 3]."""
     omega, total, share = points.T
     alpha, beta = total * share, total * (1.0 - share)
@@ -68,19 +71,18 @@ def _log_likelihood(e: np.ndarray, points: np.ndarray) -> np.ndarray:
     for t in range(1, len(e)):
         variance[t] = driven[t - 1] + beta * variance[t - 1]
     summed = (np.log(variance) + square[:, None] / variance).sum(axis=0)
-    return -0.5 * (len(e) * math.log(2.0 * math.pi) + summed)
+    likelihood: Floats = -0.5 * (len(e) * math.log(2.0 * math.pi) + summed)
+    return likelihood
 
 
-def covariance_after(
-    r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, a: float, b: float, target: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def covariance_after(r: np.ndarray, model: DccModel) -> tuple[np.ndarray, np.ndarray]:
     """H of the last sample of a window and of the one after it, by the recursions written as loops.
 
-    r                  : array [T, N], deg/s, the window
-    omega, alpha, beta : [N];  a, b : DCC, 0 for CCC;  target : S [N, N]
-    returns            : H_T and H_{T+1} [N, N], (deg/s)²
+    r       : array [T, N], deg/s, the window
+    returns : H_T and H_{T+1} [N, N], (deg/s)²
     Liu et al. (2015), eq. 1-6, with h_0 = e_0² = mean(e²) and Q_1 = S.
     """
+    omega, alpha, beta, a, b, target = model
     h = omega + (alpha + beta) * np.mean(r**2, axis=0)
     Q = target.copy()
     for row in r:
@@ -91,6 +93,7 @@ def covariance_after(
     return last, _covariance(h, Q)
 
 
-def _covariance(h: np.ndarray, Q: np.ndarray) -> np.ndarray:
+def _covariance(h: Floats, Q: Floats) -> Floats:
     scale = np.sqrt(h / np.diag(Q))
-    return Q * np.outer(scale, scale)
+    covariance: Floats = Q * np.outer(scale, scale)
+    return covariance

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats
 from vgyro.engine import recursions
 from vgyro.engine.constant import constant_correlation
 from vgyro.engine.models import DccFit, GarchFit
@@ -15,9 +16,7 @@ from vgyro.volatility.garch import _two_dimensional
 dcc_correlation = recursions.dcc_correlation
 
 
-def fit_dcc(
-    z: np.ndarray, engine: str = "native", r: np.ndarray | None = None, margins: GarchFit | None = None
-) -> DccFit:
+def fit_dcc(z: Floats, engine: str = "native", r: Floats | None = None, margins: GarchFit | None = None) -> DccFit:
     """Fit Q_t = (1-a-b)S + a z_{t-1}z'_{t-1} + b Q_{t-1} by maximising the correlation likelihood.
 
     z       : [T, N] standardised residuals e/√h
@@ -40,7 +39,7 @@ def fit_dcc(
     return engines.get(engine).dcc.fit_dcc(_two_dimensional(z), r=r, margins=margins)
 
 
-def fit_ccc(z: np.ndarray, engine: str = "native") -> DccFit:
+def fit_ccc(z: Floats, engine: str = "native") -> DccFit:
     """Constant conditional correlation: DCC with a = b = 0 (Bollerslev 1990). z [T, N]; statuses as in fit_dcc."""
     return engines.get(engine).dcc.fit_ccc(_two_dimensional(z))
 

@@ -64,7 +64,7 @@ def fit_windows(
     for group in groups:
         r = fitted_batch(values, starts[group], length, definition, span, first_of_all[group])
         garch = engines.get(engine).garch.fit_garch_windows(r)
-        fits.append((garch, fit_array_dcc_windows(r, garch.omega, garch.alpha, garch.beta, garch.status, engine)))
+        fits.append((garch, fit_array_dcc_windows(r, garch, engine)))
     order = np.argsort(np.concatenate(groups))
     return WindowFits(_joined([garch for garch, _ in fits], order), _joined([dcc for _, dcc in fits], order))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats
 from vgyro.engine import recursions
 from vgyro.engine.models import GarchFit
 from vgyro.errors import TooShort
@@ -12,7 +13,7 @@ from vgyro.errors import TooShort
 garch_variance = recursions.garch_variance
 
 
-def fit_garch(r: np.ndarray, engine: str = "native") -> GarchFit:
+def fit_garch(r: Floats, engine: str = "native") -> GarchFit:
     """Fit h_t = ω + α e²_{t-1} + β h_{t-1} to each gyro by Gaussian quasi maximum likelihood.
 
     r       : [T, N] deg/s, one series a column; the model's mean is zero

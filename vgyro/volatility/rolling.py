@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Bools, Floats
 from vgyro.config import CorrelationModel, Definition, Mode
 from vgyro.engine.models import NO_VARIANCE, NOT_POSITIVE_DEFINITE, ConditionalWeights
-from vgyro.volatility.batches import window_batch
+from vgyro.volatility.batches import WindowPlaces, window_batch
 from vgyro.volatility.stretches import Window
 
 OK = "ok"
@@ -94,7 +96,7 @@ def weights_of_windows(
     same bits whatever the chunks.
     Liu et al. (2015), sections 4 and 5; `causal` is ours.
     """
-    place = _Place.of(models, runs, step)
+    place, rows = _Place.of(models, runs, step), _Rows(values, offset)
     statuses = (OK, NO_MODEL_YET, NOT_POSITIVE_DEFINITE, too_short, NO_VARIANCE, *models.notes[1:])
     found = {mode: _blank(place.owned(mode), values.shape[1], statuses) for mode in modes}
     for mode in modes:
@@ -105,8 +107,9 @@ def weights_of_windows(
         part = models.part(chosen)
         weighed = None
         if gyros.any() and begin < end:
-            r = _residuals(values, part, end - part.length, definition, span, place.run_start[chosen], offset)
-            weighed = _weigh(r if gyros.all() else r[:, :, gyros], part, gyros, begin, end, correlation, engine)
+            r = _residuals(rows, part, end - part.length, definition, span, place.run_start[chosen])
+            some = r if gyros.all() else r[:, :, gyros]
+            weighed = _weigh(some, part, gyros, Window(begin, end), correlation, engine)
         for mode, (low, high) in zip(modes, ranges, strict=True):
             _store(found[mode], part, gyros, weighed, slice(low - begin, high - begin), int(low))
     return found
@@ -201,20 +204,23 @@ def _groups(
             yield np.array(numbers[start : start + PIECE]), ranges[first].reshape(-1, 2), gyros[first]
 
 
+class _Rows(NamedTuple):
+    """Some samples [m, N] of the series, deg/s, from number `offset` on."""
+
+    values: np.ndarray
+    offset: int
+
+
 def _residuals(
-    values: np.ndarray,
-    part: WindowModels,
-    ahead: int,
-    definition: Definition,
-    span: int,
-    run_start: np.ndarray,
-    offset: int,
+    series: _Rows, part: WindowModels, ahead: int, definition: Definition, span: int, run_start: np.ndarray
 ) -> np.ndarray:
     """r_t of windows and of the samples after them, from no more of the series than that takes."""
+    values, offset = series
     first = max(int(part.start[0]) - 1 - offset, 0)
     rows = values[first : int(part.start[-1]) + part.length + ahead - offset]
     from_here = offset + first
-    r = window_batch(rows, part.start - from_here, part.length, ahead, definition, span, run_start - from_here)
+    windows = WindowPlaces(part.start - from_here, part.length, ahead, run_start - from_here)
+    r = window_batch(rows, windows, definition, span)
     if not np.isnan(rows).any():
         return r
     # A gyro with a model may lack values after its window: there its variance goes on without a shock.
@@ -223,19 +229,13 @@ def _residuals(
 
 
 def _weigh(
-    r: np.ndarray,
-    part: WindowModels,
-    gyros: np.ndarray,
-    begin: int,
-    end: int,
-    correlation: CorrelationModel,
-    engine: str,
+    r: Floats, part: WindowModels, gyros: Bools, samples: Window, correlation: CorrelationModel, engine: str
 ) -> ConditionalWeights:
     dynamic = 0.0 if correlation == "ccc" else 1.0
     omega, alpha, beta = (parameter[:, gyros] for parameter in (part.omega, part.alpha, part.beta))
     return engines.get(engine).weights.conditional_weights(
         r, part.length, omega, alpha, beta, dynamic * part.a, dynamic * part.b, part.target[:, gyros][:, :, gyros],
-        begin, end,
+        samples.start, samples.stop,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.config import Definition
 from vgyro.volatility.batches import median_of_gyros, span_about
 from vgyro.volatility.blocks import PIECE, BlockMeans, RunFinder, block_length
@@ -70,13 +71,13 @@ def block_means(
 
 
 def window_residuals(
-    values: np.ndarray,
+    values: Floats,
     window: Window,
     definition: Definition,
     span: int = 15,
     ahead: int = 0,
     segment_start: int | None = None,
-) -> np.ndarray:
+) -> Floats:
     """r_t of the samples of one window and of `ahead` samples after it.
 
     values  : [M, N] deg/s, the series; NaN where a gyro has no value, and so is r_t then
@@ -98,7 +99,8 @@ def window_residuals(
     if definition == "level":
         return block.copy()
     if definition == "demeaned":
-        return block - block[: window.length].mean(axis=0)
+        residuals: Floats = block - block[: window.length].mean(axis=0)
+        return residuals
     if definition == "difference":
         before = window.start - 1
         known = before >= (window.start if segment_start is None else segment_start)
@@ -107,13 +109,14 @@ def window_residuals(
     return block - _running_mean(median_of_gyros(block)[:, None], window.length, span // 2)
 
 
-def detrended(r: np.ndarray, span: int) -> np.ndarray:
+def detrended(r: Floats, span: int) -> Floats:
     """r minus its running mean over `span` samples about t (fewer at the ends), [T, N]. One segment at a time."""
     return r - _running_mean(r, len(r), span // 2)
 
 
-def _running_mean(series: np.ndarray, inside: int, half: int) -> np.ndarray:
+def _running_mean(series: Floats, inside: int, half: int) -> Floats:
     """Mean over t - half to t + half of [T, N]: no further than sample `inside` - 1, and beyond that than t itself."""
     low, high = span_about(len(series), inside, half)
     total = np.concatenate([np.zeros((1, series.shape[1])), np.cumsum(series, axis=0)])
-    return (total[high + 1] - total[low]) / (high + 1 - low)[:, None]
+    mean: Floats = (total[high + 1] - total[low]) / (high + 1 - low)[:, None]
+    return mean

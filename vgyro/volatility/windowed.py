@@ -8,7 +8,7 @@ import numpy as np
 
 from vgyro import engine as engines
 from vgyro.config import Definition
-from vgyro.engine.models import ONE_GYRO, TOO_SHORT, DccWindows
+from vgyro.engine.models import ONE_GYRO, TOO_SHORT, DccWindows, GarchWindows
 from vgyro.engine.status import dcc_code, garch_code
 from vgyro.volatility.series import window_residuals
 from vgyro.volatility.stretches import Window
@@ -32,27 +32,17 @@ def fitted_residuals(
     return np.where(stuck, 0.0, r)
 
 
-def fit_array_dcc_windows(
-    r: np.ndarray,
-    omega: np.ndarray,
-    alpha: np.ndarray,
-    beta: np.ndarray,
-    status: np.ndarray,
-    engine: str = "native",
-    lags: int = 1,
-) -> DccWindows:
+def fit_array_dcc_windows(r: np.ndarray, garch: GarchWindows, engine: str = "native", lags: int = 1) -> DccWindows:
     """In each of K windows: DCC(1,1) of the gyros that have a GARCH model, and the test of constant correlation.
 
-    r                  : [K, T, N] deg/s, of `fitted_residuals`
-    omega, alpha, beta : [K, N], ω in (deg/s)², NaN for a gyro without a model
-    status             : [K, N] uint8, codes of the GARCH fits (GARCH_STATUSES)
-    engine, lags       : name of the engine; lags of the test
-    returns            : DccWindows; its target is NaN in the rows and columns of a gyro without a model. Of one gyro
-                         there is no correlation: a, b NaN, status `one gyro`; likewise of none, or `too short` where
-                         that is why
+    r            : [K, T, N] deg/s, of `fitted_residuals`
+    garch        : its models; ω is NaN for a gyro without one
+    engine, lags : name of the engine; lags of the test
+    returns      : DccWindows; its target is NaN in the rows and columns of a gyro without a model. Of one gyro there is
+                   no correlation: a, b NaN, status `one gyro`; likewise of none, or `too short` where that is why
     """
     count, _, n = r.shape
-    status = np.asarray(status)
+    omega, alpha, beta, status = garch.omega, garch.alpha, garch.beta, np.asarray(garch.status)
     found = _nothing(count, n)
     short = (status == garch_code(TOO_SHORT)).all(axis=1)
     found.status[:] = np.where(short, dcc_code(TOO_SHORT), dcc_code(ONE_GYRO))

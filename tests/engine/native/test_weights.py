@@ -8,6 +8,7 @@ from quadprog import solve_qp
 
 from vgyro.engine.covariance import usable
 from vgyro.engine.independent import nnls_weights
+from vgyro.engine.models import DccModel
 from vgyro.engine.native import weights
 from vgyro.engine.reference import weights as reference
 from vgyro.errors import EngineError
@@ -196,7 +197,7 @@ def test_the_path_against_plain_loops():
     found = weights.conditional_weights(*given, 79, 81)
     for k in range(5):
         r, _, omega, alpha, beta, a, b, target = (x if isinstance(x, int) else x[k] for x in given)
-        path = covariance_after(r[:80], omega, alpha, beta, a, b if a else 0.0, target)
+        path = covariance_after(r[:80], DccModel(omega, alpha, beta, a, b if a else 0.0, target))
         for t, H in enumerate(path):
             w = nnls_weights(H)
             np.testing.assert_allclose(found.weights[k, t], w, atol=1e-10)

@@ -10,7 +10,7 @@ from vgyro.errors import DataError
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters, SampleWeights
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.estimate import combined_without, slow_errors, slow_variance
-from vgyro.fusion.bias.model import BiasEvidence, Walk, log_likelihood, posterior
+from vgyro.fusion.bias.model import BiasEvidence, BlockNoise, Walk, log_likelihood, posterior
 from vgyro.fusion.bias.prior import Prior
 from vgyro.fusion.bias.smoother import run_filters
 from vgyro.fusion.events import FaultEvent
@@ -156,7 +156,7 @@ def test_a_mixture_of_priors(recording):
     # Expected: mean and covariance of the mixture of what each gives, by the law of total variance.
     blocks = SlowBlocks.of(recording)
     none = np.zeros(len(blocks), dtype=bool)
-    evidence = BiasEvidence.of(recording, blocks, variances(recording, blocks), CORRELATION, none, None)
+    evidence = BiasEvidence.of(recording, blocks, BlockNoise(variances(recording, blocks), CORRELATION), none)
     filtered = evidence.filtered(evidence.information(), Walk(RRW))
     share, prior = np.array([0.2, 0.3, 0.5]), np.array([[0.1] * 4, [0.01, 0.02, 0.3, 0.01], [1.0, 2.0, 0.1, 4.0]])
     each = [posterior(filtered, one) for one in prior]
@@ -175,7 +175,7 @@ def test_likelihood_against_the_dense_one(recording, change, tau):
     blocks, prior = SlowBlocks.of(array), np.array([0.1, 0.2, 0.3, 0.4])
     variance = variances(array, blocks)
     resting = blocks.all(array.at_rest)
-    evidence = BiasEvidence.of(array, blocks, variance, CORRELATION, resting, None)
+    evidence = BiasEvidence.of(array, blocks, BlockNoise(variance, CORRELATION), resting)
     found, expected = [], []
     for scale in (1.0, 3.0):
         filtered = evidence.filtered(evidence.information(), Walk(scale * RRW, tau))
@@ -194,8 +194,8 @@ def test_a_part_of_the_blocks_is_the_rest_not_measured(recording):
     kept = np.flatnonzero(np.arange(len(blocks)) % 5 < 3)
     unused = np.where(np.isin(np.arange(len(blocks)), kept)[:, None], variance, np.inf)
     none = np.zeros(len(blocks), dtype=bool)
-    part = BiasEvidence.of(array, blocks, variance, CORRELATION, none, None).part(kept)
-    whole = BiasEvidence.of(array, blocks, unused, CORRELATION, none, None)
+    part = BiasEvidence.of(array, blocks, BlockNoise(variance, CORRELATION), none).part(kept)
+    whole = BiasEvidence.of(array, blocks, BlockNoise(unused, CORRELATION), none)
     one, other = (evidence.filtered(evidence.information(), Walk(RRW, 20.0)) for evidence in (part, whole))
     prior = np.full(5, 0.1)
     assert log_likelihood(one, prior) == pytest.approx(log_likelihood(other, prior), abs=1e-8)
@@ -205,7 +205,7 @@ def test_merged_blocks_say_the_same_of_what_stands_still(recording):
     # Expected: biases that do not walk have the likelihood of the single blocks.
     blocks = SlowBlocks.of(recording)
     none = np.zeros(len(blocks), dtype=bool)
-    evidence = BiasEvidence.of(recording, blocks, variances(recording, blocks), CORRELATION, none, None)
+    evidence = BiasEvidence.of(recording, blocks, BlockNoise(variances(recording, blocks), CORRELATION), none)
     single = evidence.information()
     merged = single.merged(np.arange(0, len(blocks), 7))
     assert len(merged.gap) == 9

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.estimate import slow_errors, slow_variance
-from vgyro.fusion.bias.model import BiasEvidence, Walk
+from vgyro.fusion.bias.model import BiasEvidence, BlockNoise, Walk
 from vgyro.fusion.bias.prior import Prior, _Look, _posteriors
 from vgyro.fusion.bias.smoother import Filtered
 
@@ -57,7 +57,7 @@ def test_sums_of_variables_against_the_dense_posterior():
     # Expected: the normal posterior with the prior covariance of the sums, SVS', by dense algebra.
     array, _ = recording(1, 0.3, 0.01)
     blocks = SlowBlocks.of(array)
-    evidence = BiasEvidence.of(array, blocks, np.tile(ARW**2, (len(blocks), 1)), np.eye(GYROS), REST, None)
+    evidence = BiasEvidence.of(array, blocks, BlockNoise(np.tile(ARW**2, (len(blocks), 1)), np.eye(GYROS)), REST)
     filtered = evidence.filtered(evidence.information(), Walk(RRW, TAU))
     sums = np.column_stack([np.eye(GYROS), np.ones(GYROS)])
     variance = np.array([0.1, 0.2, 0.3, 0.1, 0.2, 0.3, 4.0])

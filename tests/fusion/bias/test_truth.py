@@ -14,7 +14,7 @@ from vgyro.fusion import ArrayNoise, CannotRun
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.choice import _Search
 from vgyro.fusion.bias.estimate import combined_without, slow_errors, slow_variance
-from vgyro.fusion.bias.model import BiasEvidence, Walk
+from vgyro.fusion.bias.model import BiasEvidence, BlockNoise, Regressor, Walk
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.ours.frequency_weights import frequency_weights, weights_at
 from vgyro.units import rrw_deg_s_rt_s
@@ -218,7 +218,9 @@ def test_slope_of_the_likelihood():
     blocks, none = SlowBlocks.of(array), np.zeros(400, dtype=bool)
     noise = 0.8 * np.eye(6) + 0.2
     array = replace(array, noise=replace(array.noise, correlation=noise))
-    evidence = BiasEvidence.of(array, blocks, np.broadcast_to(ARW**2, (400, 6)), noise, none, temperature - 30.0)
+    evidence = BiasEvidence.of(
+        array, blocks, BlockNoise(np.broadcast_to(ARW**2, (400, 6)), noise), none, Regressor(temperature - 30.0)
+    )
     search = _Search.of(evidence, blocks, RRW, ARW)
     for part, tau in product((search.information, search.information.first_regressors(6)), (np.inf, 40.0)):
 

@@ -8,6 +8,7 @@ import pytest
 from vgyro.fusion import METHODS, ArrayNoise, ArrayRates, FilterParameters
 from vgyro.fusion.motion import activity, smoother
 from vgyro.fusion.motion.models import Activity, Motion, fixed_bandwidth
+from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
 from vgyro.fusion.ours.array_estimate import analysed
 
 RATE_HZ, R = 100.0, 0.09
@@ -50,8 +51,8 @@ def test_a_rate_that_is_as_its_model_says_has_one_level(model):
             motion = Motion("random_walk", {"q": 3.0}, RATE_HZ)
         else:
             _, z = band_limited(seed, samples)
-            motion = smoother.choose_motion(z, R, one_stretch(samples), RATE_HZ)
-        assert activity.find_activity(z, R, one_stretch(samples), RATE_HZ, motion) is None
+            motion = smoother.choose_motion(NoisyRate(z, R, one_stretch(samples), RATE_HZ))
+        assert activity.find_activity(NoisyRate(z, R, one_stretch(samples), RATE_HZ), motion) is None
 
 
 def test_a_rate_that_comes_and_goes():
@@ -60,11 +61,11 @@ def test_a_rate_that_comes_and_goes():
     density, still, nees = lively(), one_stretch(int(SECONDS * RATE_HZ)), []
     for seed in range(4):
         rate, z = walk(seed, density)
-        motion = smoother.choose_motion(z, R, still, RATE_HZ, models=["random_walk"])
-        found = activity.find_activity(z, R, still, RATE_HZ, motion)
+        motion = smoother.choose_motion(NoisyRate(z, R, still, RATE_HZ), models=["random_walk"])
+        found = activity.find_activity(NoisyRate(z, R, still, RATE_HZ), motion)
         level = (density == density.min()).astype(np.uint8)
         known = Activity(level, np.sqrt(np.array([density.max(), density.min()]) / motion.parameters["q"]), 1)
-        runs = [smoother.smooth(z, R, still, RATE_HZ, motion, activity=one) for one in (found, known, None)]
+        runs = [smoother.smooth(NoisyRate(z, R, still, RATE_HZ), motion, activity=one) for one in (found, known, None)]
         ours, oracle = (float(np.mean((run.rate - rate) ** 2)) for run in runs[:2])
         assert ours < 1.1 * oracle
         calm = level == 1
@@ -78,7 +79,9 @@ def test_levels_are_those_of_the_truth():
     # Truth: q is 100 and 0.01 deg²/s³; a level is a factor of 4, and the ends of a lively time are found to a second.
     density = lively()
     _, z = walk(5, density)
-    found = activity.find_activity(z, R, one_stretch(len(z)), RATE_HZ, Motion("random_walk", {"q": 1.0}, RATE_HZ))
+    found = activity.find_activity(
+        NoisyRate(z, R, one_stretch(len(z)), RATE_HZ), Motion("random_walk", {"q": 1.0}, RATE_HZ)
+    )
     # A level is left late rather than early, so the calm one is taken somewhat too high.
     q = found.factor[found.level]
     second = np.arange(len(z)) / RATE_HZ % 30
@@ -96,7 +99,7 @@ def test_coloured_noise_is_no_liveliness():
         rate, _ = walk(seed, np.full(12_000, 3.0))
         noise = lfilter([np.sqrt(0.75 * R)], [1, -0.5], np.random.default_rng(seed + 100).standard_normal(12_000))
         motion = Motion("random_walk", {"q": 3.0}, RATE_HZ)
-        assert activity.find_activity(rate + noise, R, one_stretch(12_000), RATE_HZ, motion, 0.5) is None
+        assert activity.find_activity(NoisyRate(rate + noise, R, one_stretch(12_000), RATE_HZ, 0.5), motion) is None
 
 
 def test_the_path_against_all_paths():
@@ -126,7 +129,7 @@ def test_nothing_to_change():
     z, still = np.random.default_rng(1).standard_normal(1000), one_stretch(1000)
     sine = {"frequency_hz": 0.3, "damping": 1e-9, "sd": 3.0, "q": 0.0}
     for motion in (("random_walk", {"q": 0.0}), ("none", {}), ("oscillator", sine)):
-        assert activity.find_activity(z, 1.0, still, RATE_HZ, Motion(*motion, RATE_HZ)) is None
+        assert activity.find_activity(NoisyRate(z, 1.0, still, RATE_HZ), Motion(*motion, RATE_HZ)) is None
 
 
 def test_samples_that_say_nothing_and_gaps():
@@ -137,7 +140,7 @@ def test_samples_that_say_nothing_and_gaps():
     segment[7000:] = 1
     r[np.arange(len(z)) % 400 < 100] = np.inf
     z[np.isinf(r)] = np.nan
-    found = activity.find_activity(z, r, segment, RATE_HZ, Motion("random_walk", {"q": 1.0}, RATE_HZ))
+    found = activity.find_activity(NoisyRate(z, r, segment, RATE_HZ), Motion("random_walk", {"q": 1.0}, RATE_HZ))
     assert np.mean((found.factor[found.level] > 1) == (density > 1)) > 0.93
 
 
@@ -150,7 +153,10 @@ def test_what_is_at_rest_does_not_count():
     motion = Motion("random_walk", {"q": 3.0}, RATE_HZ)
     for seed in range(4):
         _, z = walk(seed, np.where(at_rest, 0.0, 3.0))
-        assert activity.find_activity(z, R, one_stretch(samples), RATE_HZ, motion, 0.0, at_rest, rest) is None
+        assert (
+            activity.find_activity(NoisyRate(z, R, one_stretch(samples), RATE_HZ), motion, Standstill(at_rest, rest))
+            is None
+        )
 
 
 @pytest.mark.parametrize("height", [0.0, 10.0])
@@ -162,10 +168,12 @@ def test_a_jump_at_the_end_of_standstill(height):
     rest = fixed_bandwidth(1.0, R, RATE_HZ)
     motion = Motion("random_walk", {"q": 0.01}, RATE_HZ)
     z = np.where(at_rest, 0.0, height) + np.sqrt(R) * np.random.default_rng(3).standard_normal(samples)
-    found = smoother.smooth(z, R, one_stretch(samples), RATE_HZ, motion, at_rest=at_rest, rest=rest)
+    found = smoother.smooth(
+        NoisyRate(z, R, one_stretch(samples), RATE_HZ), motion, standstill=Standstill(at_rest, rest)
+    )
     if height:
-        after = smoother.smooth(z[edge:], R, one_stretch(samples - edge), RATE_HZ, motion)
-        before = smoother.smooth(z[:edge], R, one_stretch(edge), RATE_HZ, rest)
+        after = smoother.smooth(NoisyRate(z[edge:], R, one_stretch(samples - edge), RATE_HZ), motion)
+        before = smoother.smooth(NoisyRate(z[:edge], R, one_stretch(edge), RATE_HZ), rest)
         np.testing.assert_allclose(found.rate, np.append(before.rate, after.rate), atol=1e-4)
         np.testing.assert_allclose(found.variance, np.append(before.variance, after.variance), rtol=1e-3)
     else:

@@ -8,6 +8,7 @@ import pytest
 from vgyro.errors import DataError
 from vgyro.fusion.motion import smoother
 from vgyro.fusion.motion.models import Motion, SteadyGain, fixed_bandwidth, random_walk_keep
+from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
 from vgyro.fusion.motion.start import wide_start
 
 RATE = 20.0
@@ -65,12 +66,12 @@ def test_against_the_dense_posterior_and_filterpy(motion, phi):
     # Expected: np.linalg on the joint covariance of both stretches, one by one; and the reference engine, filterpy.
     z, r = measured(100)
     segment = np.repeat([0, 3], [60, 40])
-    found = smoother.smooth(z, r, segment, RATE, motion, phi)
+    found = smoother.smooth(NoisyRate(z, r, segment, RATE, phi), motion)
     for part in (slice(0, 60), slice(60, 100)):
         rate, variance = dense(z[part], r[part], motion, phi)
         np.testing.assert_allclose(found.rate[part], rate, rtol=1e-8, atol=1e-8)
         np.testing.assert_allclose(found.variance[part], variance, rtol=1e-8)
-    theirs = smoother.smooth(z, r, segment, RATE, motion, phi, engine="reference")
+    theirs = smoother.smooth(NoisyRate(z, r, segment, RATE, phi), motion, engine="reference")
     np.testing.assert_allclose(found.rate, theirs.rate, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(found.variance, theirs.variance, rtol=1e-8)
     assert found.passes == 0
@@ -82,7 +83,7 @@ def test_random_walk_far_from_the_ends(ratio):
     samples, r = int(60 / math.sqrt(ratio)) + 200, 0.25
     motion = Motion("random_walk", {"q": ratio * r * RATE}, RATE)
     z = np.random.default_rng(1).standard_normal(samples)
-    found = smoother.smooth(z, r, np.zeros(samples, dtype=int), RATE, motion)
+    found = smoother.smooth(NoisyRate(z, r, np.zeros(samples, dtype=int), RATE), motion)
     keep = random_walk_keep(ratio)
     assert found.variance[samples // 2] == pytest.approx(r * (1 - keep) / (1 + keep), rel=1e-6)
     assert found.variance[-1] == pytest.approx(r * (1 - keep), rel=1e-6)
@@ -97,15 +98,15 @@ def test_passes_only_of_a_first_order_low_pass():
     # Expected: by definition: constant r, white noise, random walk.
     z, walk = np.random.default_rng(1).standard_normal(50), MOTIONS[0]
     still = np.zeros(50, dtype=int)
-    assert smoother.smooth(z, np.full(50, 0.1), still, RATE, walk).passes == 2
-    assert smoother.smooth(z, np.linspace(0.1, 0.2, 50), still, RATE, walk).passes == 0
-    assert smoother.smooth(z, 0.1, still, RATE, walk, phi=0.2).passes == 0
-    assert smoother.smooth(z, 0.1, still, RATE, MOTIONS[1]).passes == 0
+    assert smoother.smooth(NoisyRate(z, np.full(50, 0.1), still, RATE), walk).passes == 2
+    assert smoother.smooth(NoisyRate(z, np.linspace(0.1, 0.2, 50), still, RATE), walk).passes == 0
+    assert smoother.smooth(NoisyRate(z, 0.1, still, RATE, 0.2), walk).passes == 0
+    assert smoother.smooth(NoisyRate(z, 0.1, still, RATE), MOTIONS[1]).passes == 0
 
 
 def test_no_smoothing():
     z, r = measured(30)
-    found = smoother.smooth(z, r, np.zeros(30, dtype=int), RATE, fixed_bandwidth(9.0, 1.0, RATE))
+    found = smoother.smooth(NoisyRate(z, r, np.zeros(30, dtype=int), RATE), fixed_bandwidth(9.0, 1.0, RATE))
     np.testing.assert_array_equal(found.rate, z)
     np.testing.assert_array_equal(found.variance, r)
     assert math.isnan(found.bandwidth_hz)
@@ -115,7 +116,7 @@ def test_no_smoothing():
 def test_a_stretch_that_says_nothing():
     z, r = measured(60)
     r[20:40], z[20:40] = np.inf, np.nan
-    found = smoother.smooth(z, r, np.repeat([0, 1, 2], 20), RATE, MOTIONS[1])
+    found = smoother.smooth(NoisyRate(z, r, np.repeat([0, 1, 2], 20), RATE), MOTIONS[1])
     assert np.isnan(found.rate[20:40]).all()
     assert np.isinf(found.variance[20:40]).all()
     assert np.isfinite(found.rate[:20]).all()
@@ -125,7 +126,7 @@ def test_a_stretch_that_says_nothing():
 def test_fixed_bandwidth_claims_the_noise_that_it_leaves():
     # Expected: over the variance of what is made of white noise, known from the simulation, mean square / claim = 1.
     z = 0.5 * np.random.default_rng(3).standard_normal(200_000)
-    found = smoother.smooth(z, 0.25, np.zeros(len(z), dtype=int), 200.0, fixed_bandwidth(2.0, 0.25, 200.0))
+    found = smoother.smooth(NoisyRate(z, 0.25, np.zeros(len(z), dtype=int), 200.0), fixed_bandwidth(2.0, 0.25, 200.0))
     assert np.mean(found.rate**2 / found.variance) == pytest.approx(1.0, abs=0.03)
     assert found.bandwidth_hz == pytest.approx(2.0)
 
@@ -143,9 +144,9 @@ def test_at_rest_within_a_motion(motion):
     truth = 0.3 + np.where(moving, swing, 0.0)
     z, still = truth + 0.3 * rng.standard_normal(len(time)), np.zeros(len(time), dtype=int)
     rest = fixed_bandwidth(0.5, 0.09, RATE)
-    found = smoother.smooth(z, 0.09, still, RATE, motion, at_rest=~moving, rest=rest)
-    alone = smoother.smooth(z, 0.09, still, RATE, rest)
-    cut = smoother.smooth(z[moving], 0.09, still[moving], RATE, motion)
+    found = smoother.smooth(NoisyRate(z, 0.09, still, RATE), motion, standstill=Standstill(~moving, rest))
+    alone = smoother.smooth(NoisyRate(z, 0.09, still, RATE), rest)
+    cut = smoother.smooth(NoisyRate(z[moving], 0.09, still[moving], RATE), motion)
     far = (time < 98) | (time > 122)
     assert rms(found.rate[far] - truth[far]) == pytest.approx(rms(alone.rate[far] - truth[far]), rel=0.01)
     # A Markov rate knows its mean: that is worth 0.5 % of the first sample's variance.
@@ -162,19 +163,19 @@ def rms(values):
 def test_what_does_not_fit():
     z, still = np.zeros(20), np.zeros(20, dtype=int)
     with pytest.raises(DataError, match="do not fit"):
-        smoother.smooth(z, np.ones(3), still, RATE, MOTIONS[0])
+        smoother.smooth(NoisyRate(z, np.ones(3), still, RATE), MOTIONS[0])
     with pytest.raises(DataError, match="coefficient 1"):
-        smoother.smooth(z, 1.0, still, RATE, MOTIONS[0], phi=1.0)
+        smoother.smooth(NoisyRate(z, 1.0, still, RATE, 1.0), MOTIONS[0])
     with pytest.raises(DataError, match="the samples of 50 Hz"):
-        smoother.smooth(z, 1.0, still, 50.0, MOTIONS[0])
+        smoother.smooth(NoisyRate(z, 1.0, still, 50.0), MOTIONS[0])
     with pytest.raises(DataError, match="every variance is infinite"):
-        smoother.smooth(z, np.inf, still, RATE, MOTIONS[0])
+        smoother.smooth(NoisyRate(z, np.inf, still, RATE), MOTIONS[0])
     with pytest.raises(DataError, match="random walk, not jerk"):
-        smoother.smooth(z, 1.0, still, RATE, MOTIONS[1], at_rest=still == 0, rest=MOTIONS[2])
+        smoother.smooth(NoisyRate(z, 1.0, still, RATE), MOTIONS[1], standstill=Standstill(still == 0, MOTIONS[2]))
 
 
 def test_bandwidths_are_those_at_the_mean_variance():
     z, r = measured(100)
-    found = smoother.smooth(z, r, np.zeros(100, dtype=int), RATE, MOTIONS[2], 0.3)
+    found = smoother.smooth(NoisyRate(z, r, np.zeros(100, dtype=int), RATE, 0.3), MOTIONS[2])
     steady = SteadyGain(MOTIONS[2], float(r[np.isfinite(r)].mean()), 0.3)
     assert (found.bandwidth_hz, found.noise_bandwidth_hz) == (steady.bandwidth_hz(), steady.noise_bandwidth_hz())

@@ -14,6 +14,7 @@ from vgyro.fusion.motion import choice
 from vgyro.fusion.motion.choice import _compared
 from vgyro.fusion.motion.evidence import gather
 from vgyro.fusion.motion.models import Motion
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 from vgyro.fusion.motion.search import MotionFit
 from vgyro.fusion.motion.smoother import choose_motion, smooth
 
@@ -46,8 +47,8 @@ def one_stretch(z):
 def nees(truth, noise, r, rate_hz, phi=0.0, models=DRIVEN):
     """Normalised squared error of the smoother whose model is chosen on the same samples."""
     z = truth + noise
-    motion = choose_motion(z, r, one_stretch(z), rate_hz, phi, models)
-    found = smooth(z, r, one_stretch(z), rate_hz, motion, phi)
+    motion = choose_motion(NoisyRate(z, r, one_stretch(z), rate_hz, phi), models)
+    found = smooth(NoisyRate(z, r, one_stretch(z), rate_hz, phi), motion)
     return float(np.mean((found.rate - truth) ** 2 / found.variance))
 
 
@@ -92,8 +93,8 @@ def test_sinusoid(phi):
     oscillator is found."""
     time = np.arange(16_000) / 500.0
     z = 63.0 * np.sin(2 * math.pi * 0.25 * time) + 2.4 * coloured(7, len(time), phi)
-    motion = choose_motion(z, 2.4**2, one_stretch(z), 500.0, phi)
-    found = smooth(z, 2.4**2, one_stretch(z), 500.0, motion, phi)
+    motion = choose_motion(NoisyRate(z, 2.4**2, one_stretch(z), 500.0, phi))
+    found = smooth(NoisyRate(z, 2.4**2, one_stretch(z), 500.0, phi), motion)
     basis = np.column_stack([np.sin(2 * math.pi * 0.25 * time), np.cos(2 * math.pi * 0.25 * time)])
     inphase, quadrature = np.linalg.lstsq(basis, found.rate, rcond=None)[0]
     assert math.hypot(inphase, quadrature) == pytest.approx(63.0, rel=0.005)
@@ -110,7 +111,7 @@ def test_colour_is_not_taken_for_motion():
     for seed in range(6):
         z = np.cumsum(white(seed, 10_000)) * math.sqrt(q / 500.0) + 2.4 * coloured(seed + 50, 10_000)
         for phi, into in ((POLE, given), (0.0, ignored)):
-            motion = choose_motion(z, 2.4**2, one_stretch(z), 500.0, phi, ("random_walk",))
+            motion = choose_motion(NoisyRate(z, 2.4**2, one_stretch(z), 500.0, phi), ("random_walk",))
             into.append(motion.parameters["q"])
     assert np.mean(given) == pytest.approx(q, rel=0.15)
     assert np.mean(ignored) > 2 * q
@@ -121,8 +122,8 @@ def test_a_constant_rate():
     errors = []
     for seed in range(6):
         z = 5.0 + 0.3 * white(seed, 4000)
-        motion = choose_motion(z, 0.09, one_stretch(z), 200.0)
-        errors.append(np.mean((smooth(z, 0.09, one_stretch(z), 200.0, motion).rate - 5.0) ** 2))
+        motion = choose_motion(NoisyRate(z, 0.09, one_stretch(z), 200.0))
+        errors.append(np.mean((smooth(NoisyRate(z, 0.09, one_stretch(z), 200.0), motion).rate - 5.0) ** 2))
     assert math.sqrt(np.mean(errors)) < 2 * 0.3 / math.sqrt(4000)
 
 
@@ -130,8 +131,8 @@ def test_few_samples_at_1_hz():
     # Known truth: a random walk of 300 samples; the fit beats the samples themselves and the constant.
     truth = np.cumsum(white(1, 300)) * 0.02
     z = truth + 0.05 * white(2, 300)
-    motion = choose_motion(z, 0.05**2, one_stretch(z), 1.0)
-    error = smooth(z, 0.05**2, one_stretch(z), 1.0, motion).rate - truth
+    motion = choose_motion(NoisyRate(z, 0.05**2, one_stretch(z), 1.0))
+    error = smooth(NoisyRate(z, 0.05**2, one_stretch(z), 1.0), motion).rate - truth
     assert np.std(error) < 0.6 * 0.05
 
 
@@ -142,10 +143,10 @@ def test_a_long_recording_in_pieces():
     found = []
     for seed in range(4):
         z = np.cumsum(white(seed, samples)) * math.sqrt(q / rate_hz) + 2.0 * white(seed + 50, samples)
-        motion = choose_motion(z, 4.0, one_stretch(z), rate_hz, models=("random_walk",))
+        motion = choose_motion(NoisyRate(z, 4.0, one_stretch(z), rate_hz), models=("random_walk",))
         found.append(motion.parameters["q"])
     assert np.mean(found) == pytest.approx(q, rel=0.15)
-    assert [len(one.z) for one in gather(z, 4.0, one_stretch(z), rate_hz, 0.0, None)] == [200_000, 200_000]
+    assert [len(one.z) for one in gather(NoisyRate(z, 4.0, one_stretch(z), rate_hz))] == [200_000, 200_000]
 
 
 def test_only_moving_samples_count():
@@ -155,8 +156,8 @@ def test_only_moving_samples_count():
     z = 0.1 * white(3, 9000)
     z[moving] += np.cumsum(white(4, 3000)) * 0.05
     part = z[moving]
-    whole = choose_motion(z, 0.01, one_stretch(z), 100.0, models=DRIVEN, moving=moving)
-    alone = choose_motion(part, 0.01, one_stretch(part), 100.0, models=DRIVEN)
+    whole = choose_motion(NoisyRate(z, 0.01, one_stretch(z), 100.0), models=DRIVEN, moving=moving)
+    alone = choose_motion(NoisyRate(part, 0.01, one_stretch(part), 100.0), models=DRIVEN)
     assert (whole.model, whole.parameters) == (alone.model, alone.parameters)
 
 
@@ -167,9 +168,11 @@ def test_what_smooths_best_is_found():
     for seed in range(4):
         truth = band_limited(seed, 12000, 100.0, 20.0, 0.5)
         z = truth + white(seed + 50, 12000)
-        motion = choose_motion(z, 1.0, one_stretch(z), 100.0, models=("jerk",))
+        motion = choose_motion(NoisyRate(z, 1.0, one_stretch(z), 100.0), models=("jerk",))
         others = [replace(motion, parameters={"q": motion.parameters["q"] * 2.0**k}) for k in range(-4, 5)]
-        errors = [np.std(smooth(z, 1.0, one_stretch(z), 100.0, one).rate - truth) for one in (motion, *others)]
+        errors = [
+            np.std(smooth(NoisyRate(z, 1.0, one_stretch(z), 100.0), one).rate - truth) for one in (motion, *others)
+        ]
         ratios.append(errors[0] / min(errors))
     assert np.mean(ratios) < 1.02
 
@@ -195,7 +198,7 @@ def test_a_model_that_breaks_down_is_left_out(monkeypatch):
 
     monkeypatch.setattr(choice, "_compared", compared)
     monkeypatch.setattr(native, "smooth", smoothing)
-    motion = choose_motion(z, 1.0, one_stretch(z), 50.0)
+    motion = choose_motion(NoisyRate(z, 1.0, one_stretch(z), 50.0))
     assert motion.table[0].parameters == BROKEN
     assert motion.parameters == motion.table[1].parameters
 
@@ -205,9 +208,9 @@ def test_parameters_that_broke_the_smoother(r):
     # Expected: a finite rate, or an error that is caught; never one that ends the job.
     z = 1e3 * np.cumsum(white(4, 3000))
     with suppress(EngineError, DataError):
-        smoothed = smooth(z, r, one_stretch(z), 50.0, Motion("oscillator", BROKEN, 50.0))
+        smoothed = smooth(NoisyRate(z, r, one_stretch(z), 50.0), Motion("oscillator", BROKEN, 50.0))
         assert np.isfinite(smoothed.rate).all()
-    assert choose_motion(z, r, one_stretch(z), 50.0) is not None
+    assert choose_motion(NoisyRate(z, r, one_stretch(z), 50.0)) is not None
 
 
 def test_gaps_and_samples_that_say_nothing():
@@ -218,7 +221,7 @@ def test_gaps_and_samples_that_say_nothing():
     r = np.ones(12000)
     lost = rng.random(12000) < 0.1
     r[lost], z[lost] = np.inf, np.nan
-    motion = choose_motion(z, r, segment, 100.0, models=("random_walk",))
+    motion = choose_motion(NoisyRate(z, r, segment, 100.0), models=("random_walk",))
     assert motion.parameters["q"] == pytest.approx(1.0, rel=0.3)
 
 
@@ -226,16 +229,16 @@ def test_gaps_and_samples_that_say_nothing():
 def test_data_without_noise(value):
     z = np.full(500, value)
     with pytest.raises(DataError, match="at every sample"):
-        choose_motion(z, 1.0, one_stretch(z), 100.0)
+        choose_motion(NoisyRate(z, 1.0, one_stretch(z), 100.0))
     with pytest.raises(DataError, match="sample 0: the variance of the noise is not above zero"):
-        choose_motion(white(1, 500), 0.0, one_stretch(z), 100.0)
+        choose_motion(NoisyRate(white(1, 500), 0.0, one_stretch(z), 100.0))
 
 
 def test_too_few_samples():
     z = white(1, 500)
     with pytest.raises(TooShort, match="0 samples"):
-        choose_motion(z[:31], 1.0, one_stretch(z[:31]), 100.0)
+        choose_motion(NoisyRate(z[:31], 1.0, one_stretch(z[:31]), 100.0))
     with pytest.raises(TooShort, match="0 samples"):
-        choose_motion(z, 1.0, np.arange(500), 100.0)
+        choose_motion(NoisyRate(z, 1.0, np.arange(500), 100.0))
     with pytest.raises(TooShort, match="say anything"):
-        choose_motion(z, np.full(500, np.inf), one_stretch(z), 100.0)
+        choose_motion(NoisyRate(z, np.full(500, np.inf), one_stretch(z), 100.0))

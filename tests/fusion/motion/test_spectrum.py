@@ -12,6 +12,7 @@ from vgyro.fusion.motion.choice import beside_fixed, choose_motion
 from vgyro.fusion.motion.evidence import gather, spectrum
 from vgyro.fusion.motion.lines import peak, sinusoid
 from vgyro.fusion.motion.models import NARROW, Motion, SteadyGain, fixed_bandwidth
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 from vgyro.fusion.motion.search import FAMILIES, search
 from vgyro.fusion.motion.shared import shared_lines
 from vgyro.fusion.motion.smoother import smooth
@@ -77,7 +78,7 @@ def test_noise_of_pieces_with_holes(phi):
     for seed in range(200):
         noise = np.random.default_rng(seed).standard_normal(samples + 100)
         noise = lfilter([math.sqrt(1 - phi**2)], [1, -phi], noise)[100:] if phi else noise[100:]
-        found = spectrum(gather(deviation * noise, r, one_stretch(r), RATE_HZ, phi, None), RATE_HZ)
+        found = spectrum(gather(NoisyRate(deviation * noise, r, one_stretch(r), RATE_HZ, phi)), RATE_HZ)
         total = total + found.power / 200
     octave = np.floor(np.log2(found.frequency)).astype(int)
     for one in np.unique(octave):
@@ -108,10 +109,10 @@ def test_estimated_risk_is_that_of_the_smoother():
         for seed in range(24):
             truth = poles(seed, samples)
             z = truth + white(seed, samples)
-            found = spectrum(gather(z, R, one_stretch(z), RATE_HZ, 0.0, None), RATE_HZ)
+            found = spectrum(gather(NoisyRate(z, R, one_stretch(z), RATE_HZ)), RATE_HZ)
             signal = FAMILIES[model].density({"q": np.array(q)}, found.frequency, RATE_HZ)
             estimated.append(float(found.risk(signal)) / found.weight.sum())
-            error = smooth(z, R, one_stretch(z), RATE_HZ, motion).rate - truth
+            error = smooth(NoisyRate(z, R, one_stretch(z), RATE_HZ), motion).rate - truth
             true.append(np.mean(error[500:-500] ** 2) / R)
         apart = np.array(estimated) - np.array(true)
         assert abs(apart.mean()) < 3.0 * apart.std(ddof=1) / math.sqrt(len(apart))
@@ -121,7 +122,7 @@ def test_no_leakage_from_eight_decades():
     # Truth: three poles of 0.02 Hz, 2000 deg/s, twelve decades above the noise, are 1 % of it above 5 Hz, and nothing
     # leaks there.
     z = poles(3, 30_000, 2000.0, 0.02) + white(3, 30_000)
-    found = spectrum(gather(z, R, one_stretch(z), RATE_HZ, 0.0, None), RATE_HZ).between(5.0, 20.0)
+    found = spectrum(gather(NoisyRate(z, R, one_stretch(z), RATE_HZ)), RATE_HZ).between(5.0, 20.0)
     assert np.mean(found.power / found.noise) == pytest.approx(1.0, abs=0.05)
 
 
@@ -132,11 +133,11 @@ def test_pieces():
     r[:5], r[100:110], r[300:330], r[990:] = np.inf, np.inf, np.inf, np.inf
     z = np.random.default_rng(1).standard_normal(1000)
     z[np.isinf(r)] = np.nan
-    found = gather(z, r, segment, RATE_HZ, 0.0, None)
+    found = gather(NoisyRate(z, r, segment, RATE_HZ))
     assert [(one.start, len(one.z)) for one in found] == [(5, 295), (330, 270), (600, 390)]
     moving = np.ones(1000, dtype=bool)
     moving[700:800] = False
-    found = gather(z, r, segment, RATE_HZ, 0.0, moving)
+    found = gather(NoisyRate(z, r, segment, RATE_HZ), moving)
     assert [(one.start, len(one.z)) for one in found] == [(5, 295), (330, 270), (600, 100), (800, 190)]
     assert all(np.isfinite(one.z).all() for one in found)
 
@@ -145,7 +146,7 @@ def test_many_pieces_are_thinned_out(monkeypatch):
     monkeypatch.setattr(evidence, "LONGEST", 100)
     monkeypatch.setattr(evidence, "MOST_SAMPLES", 500)
     z = np.random.default_rng(1).standard_normal(2000)
-    found = gather(z, 1.0, one_stretch(z), RATE_HZ, 0.0, None)
+    found = gather(NoisyRate(z, 1.0, one_stretch(z), RATE_HZ))
     assert [one.start for one in found] == [0, 400, 900, 1400, 1900]
 
 
@@ -162,7 +163,9 @@ def test_samples_far_off_are_no_motion(sort):
             noise /= math.sqrt(0.98 + 0.02 * 100.0)
         z, known = truth + math.sqrt(R) * noise, truth + white(seed, 20_000)
         runs = [
-            smooth(z, R, one_stretch(z), RATE_HZ, choose_motion(one, R, one_stretch(z), RATE_HZ)).rate
+            smooth(
+                NoisyRate(z, R, one_stretch(z), RATE_HZ), choose_motion(NoisyRate(one, R, one_stretch(z), RATE_HZ))
+            ).rate
             for one in (z, known)
         ]
         ratios.append(np.std(runs[0] - truth) / np.std(runs[1] - truth))
@@ -178,8 +181,8 @@ def test_vibrations_are_motion():
         truth = poles(seed, len(time))
         for other in (waves, 0.0):
             z = truth + other + white(seed, len(time))
-            motion = choose_motion(z, R, one_stretch(z), RATE_HZ)
-            found = smooth(z, R, one_stretch(z), RATE_HZ, motion)
+            motion = choose_motion(NoisyRate(z, R, one_stretch(z), RATE_HZ))
+            found = smooth(NoisyRate(z, R, one_stretch(z), RATE_HZ), motion)
             errors.append(np.std((found.rate - truth - other)[500:-500]))
             nees.append(np.mean((found.rate - truth - other)[500:-500] ** 2 / found.variance[500:-500]))
             assert len(motion.lines) == (3 if other is waves else 0)
@@ -193,7 +196,7 @@ def test_a_broad_vibration_has_a_width():
     turn = math.exp(-2 * math.pi * own * damping / RATE_HZ)
     wave = lfilter([1], [1, -2 * turn * math.cos(2 * math.pi * own / RATE_HZ), turn**2], white(9, samples))
     z = poles(1, samples) + 0.1 * wave / wave.std() + white(1, samples)
-    line = max(choose_motion(z, R, one_stretch(z), RATE_HZ).lines, key=lambda one: one.sd)
+    line = max(choose_motion(NoisyRate(z, R, one_stretch(z), RATE_HZ)).lines, key=lambda one: one.sd)
     assert line.frequency_hz == pytest.approx(own, rel=0.01)
     assert line.damping == pytest.approx(damping, rel=0.4)
     assert line.sd == pytest.approx(0.1, rel=0.2)
@@ -202,7 +205,7 @@ def test_a_broad_vibration_has_a_width():
 def test_no_lines_in_noise():
     # Truth: none. The price of a line is such that the highest of all lines of white noise is hardly ever taken.
     for seed in range(12):
-        motion = choose_motion(white(seed, 20_000), R, one_stretch(np.empty(20_000)), RATE_HZ)
+        motion = choose_motion(NoisyRate(white(seed, 20_000), R, one_stretch(np.empty(20_000)), RATE_HZ))
         assert motion.lines == ()
         assert motion.model != "oscillator"
 
@@ -214,7 +217,7 @@ def test_frequency_of_a_sinusoid():
     limit = 4 * 1.5 * math.sqrt(6 * R) / (math.pi * size * samples / RATE_HZ * math.sqrt(samples))
     for seed, own in enumerate((3.1234, 7.0, 12.3456)):
         z = size * np.sin(2 * math.pi * own * time + seed) + white(seed, samples)
-        pieces = gather(z, R, one_stretch(z), RATE_HZ, 0.0, None)
+        pieces = gather(NoisyRate(z, R, one_stretch(z), RATE_HZ))
         whole = spectrum(pieces, RATE_HZ)
         there = peak(whole, np.zeros(len(whole.frequency)))
         assert there.sharp
@@ -238,13 +241,13 @@ def test_a_line_of_one_gyro_is_noise(gyros):
         shared = shared_lines(seen, segment, RATE_HZ)
         assert shared(5.0) is expected
         z = seen.mean(axis=1)
-        motion = choose_motion(z, 0.04 / gyros, segment, RATE_HZ, shared=shared)
+        motion = choose_motion(NoisyRate(z, 0.04 / gyros, segment, RATE_HZ), shared=shared)
         assert len(motion.lines) == expected
 
 
 def test_no_lines_are_looked_for():
     z = np.sin(2 * math.pi * 5.0 * np.arange(5000) / RATE_HZ) + poles(1, 5000) + white(1, 5000)
-    assert choose_motion(z, R, one_stretch(z), RATE_HZ, lines=False).lines == ()
+    assert choose_motion(NoisyRate(z, R, one_stretch(z), RATE_HZ), lines=False).lines == ()
 
 
 def test_at_rest_a_vibration_is_passed_and_the_rest_is_in_the_deviation():
@@ -261,23 +264,23 @@ def test_at_rest_a_vibration_is_passed_and_the_rest_is_in_the_deviation():
         (0.7 * np.sin(2 * math.pi * 5.0 * time), 1, 0.0),
         (0.1 * broad / broad.std(), 0, 0.01),
     ):
-        found = beside_fixed(truth + white(5, samples), R, one_stretch(truth), RATE_HZ, 0.0, fixed)
+        found = beside_fixed(NoisyRate(truth + white(5, samples), R, one_stretch(truth), RATE_HZ), fixed)
         assert len(found.lines) == count
         assert found.lost == pytest.approx(lost, rel=0.1, abs=1e-6)
-    none = beside_fixed(truth, R, one_stretch(truth), RATE_HZ, 0.0, Motion("none", {}, RATE_HZ))
+    none = beside_fixed(NoisyRate(truth, R, one_stretch(truth), RATE_HZ), Motion("none", {}, RATE_HZ))
     assert (none.lines, none.lost) == ((), 0.0)
 
 
 def test_nothing_to_smooth():
     # Truth: a rate that is white as far as it is seen. Its neighbours say nothing, and no model is to say otherwise.
     z = 10.0 * np.random.default_rng(3).standard_normal(4000)
-    motion = choose_motion(z, R, one_stretch(z), RATE_HZ)
-    assert np.std(smooth(z, R, one_stretch(z), RATE_HZ, motion).rate - z) < 1.02 * math.sqrt(R)
+    motion = choose_motion(NoisyRate(z, R, one_stretch(z), RATE_HZ))
+    assert np.std(smooth(NoisyRate(z, R, one_stretch(z), RATE_HZ), motion).rate - z) < 1.02 * math.sqrt(R)
 
 
 def test_a_sinusoid_stays_one():
     z = 3.0 * np.sin(2 * math.pi * 0.7 * np.arange(6000) / RATE_HZ) + white(4, 6000)
-    motion = choose_motion(z, R, one_stretch(z), RATE_HZ)
+    motion = choose_motion(NoisyRate(z, R, one_stretch(z), RATE_HZ))
     assert motion.model == "oscillator"
     assert motion.parameters["damping"] <= NARROW
 
@@ -302,10 +305,10 @@ def test_what_the_choice_costs(monkeypatch):
         for _ in range(60):
             search(bands, "random_walk", (), 0.0)
 
-    bands = spectrum(gather(z, R, one_stretch(z), RATE_HZ, 0.0, None), RATE_HZ).bands()
-    choose_motion(z, R, one_stretch(z), RATE_HZ)
+    bands = spectrum(gather(NoisyRate(z, R, one_stretch(z), RATE_HZ)), RATE_HZ).bands()
+    choose_motion(NoisyRate(z, R, one_stretch(z), RATE_HZ))
     assert passes == [choice.CHECKED]
-    assert cost(lambda: choose_motion(z, R, one_stretch(z), RATE_HZ)) < cost(transforms)
+    assert cost(lambda: choose_motion(NoisyRate(z, R, one_stretch(z), RATE_HZ))) < cost(transforms)
 
 
 def cpu(work):

@@ -10,6 +10,7 @@ from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter, ss2tf
 
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 from vgyro.fusion.motion.smoother import Smoothed, choose_motion, smooth
 
 SETTLED = 400
@@ -115,7 +116,10 @@ def oracle(one: Case) -> Smoothed:
     """Smoothed by one who knows the variance of every sample and the bias of every gyro; motion by likelihood."""
     z, r = known_weights(one)
     rate_hz, segment = one.array.rate_hz, one.array.segment
-    return smooth(z, r, segment, rate_hz, choose_motion(z, r, segment, rate_hz, models=one.parameters.motion_models))
+    return smooth(
+        NoisyRate(z, r, segment, rate_hz),
+        choose_motion(NoisyRate(z, r, segment, rate_hz), models=one.parameters.motion_models),
+    )
 
 
 def wiener_sd(one: Case, motion_sd: float, bandwidth_hz: float) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from vgyro.arrays import Floats
 from vgyro.board import Board
 from vgyro.cli.drafts.looking import HEAD_ROWS, head_of
 from vgyro.cli.drafts.manifest_text import LogDraft
@@ -122,9 +123,10 @@ def holds_counts(opened: LogFile, table: LogTable, board: Board) -> bool:
     return True
 
 
-def _known(column: pa.Array) -> np.ndarray:
+def _known(column: pa.Array) -> Floats:
     values = column.to_numpy(zero_copy_only=False)[:HEAD_ROWS].astype(np.float64)
-    return values[np.isfinite(values)]
+    known: Floats = values[np.isfinite(values)]
+    return known
 
 
 def _fractions(values: np.ndarray) -> bool:

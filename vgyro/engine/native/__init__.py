@@ -26,7 +26,11 @@ from vgyro.errors import EngineError
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
-    from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights  # noqa: F401
+    from vgyro.engine.native import adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights
+    from vgyro.engine.protocols.engines import Modules
+
+    # An error of types here: a module is not what its protocol says.
+    _modules: Modules = adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights
 
     # Compiled: they have no Python source to read types from.
     _adaptive: Any

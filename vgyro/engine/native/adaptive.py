@@ -7,9 +7,11 @@ members of the second.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine.finite import not_positive_definite, refuse_broken
 from vgyro.engine.native import _adaptive
 
@@ -26,19 +28,11 @@ def scale_bias_filter(
     state: np.ndarray,
     covariance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Extended Kalman filter of x = [w, ẇ, b_1..b_N, s_1..s_N] with y_i = (1 + s_i)·w + b_i + n_i, Σb = Σs = 0.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.scale_bias_filter.
 
-    rate       : array [T, N], deg/s, N >= 2;  period : of the samples, s
-    noise      : covariance of a sample [N, N], (deg/s)²
-    drive      : process noise of (w, ẇ) a sample [2, 2]; w follows from ẇ by w + period·ẇ
-    walk       : variance of a sample's step of each bias [N], (deg/s)²; s is constant
-    state, covariance : [2+2N], [2+2N, 2+2N], before the first sample. What they and `walk` hold along Σb and Σs is
-                 dropped: these sums are zero, and known to be, for ever
-    returns    : w after each sample [T], deg/s; state and covariance after the last
-    raises     : EngineError that names the first sample that is not finite, or if `noise` is not positive definite
-    Predict, then update. The row of H for y_i is [1 + s_i, 0, e_i, w·e_i] at the predicted state. The sums are kept at
-    zero by an orthonormal basis B, b = Bβ and s = Bσ, so the filter has 2N states. The readings are made independent
-    once, by the Cholesky factor of `noise` (rows of H are mixed alike), and are then used one after the other.
+    The sums are kept at zero by an orthonormal basis B, b = Bβ and s = Bσ, so the filter has 2N states. The readings
+    are made independent once, by the Cholesky factor of `noise` (rows of H are mixed alike), and are then used one
+    after the other.
     """
     gyros = rate.shape[1]
     basis = _zero_sum_basis(gyros)
@@ -68,17 +62,9 @@ def filter_bank(
     probability: np.ndarray,
     least: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Multiple-model estimate of a rate that is a random walk: a Kalman filter for each noise and each process noise.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.filter_bank.
 
-    rate     : array [T, N], deg/s, N >= 2
-    noise    : covariances of a sample [J, N, N], (deg/s)²;  process : variances of the step to each sample [K]
-    start, variance : mean and variance of every member before the first sample
-    probability : [J, K], of the members, before the first sample;  least : below it none falls
-    returns  : Σ p·x after each sample [T], deg/s; p after the last [J, K]; mean of p over the samples [J, K]
-    raises   : EngineError that names the first sample that is not finite, or if a `noise` is not positive definite
-    Each member predicts and updates with its own variance P(t). Then p ∝ p·|S|^-½·exp(-½e'S⁻¹e), e = y - 1·x, is made
-    to add up to 1, raised to `least` where it is below, and made to add up to 1 again. With D = 1'R⁻¹1 and
-    u = R⁻¹1/D, Sherman & Morrison (1950) gives S⁻¹ and |S| of S = R + 1·P·1':
+    With D = 1'R⁻¹1 and u = R⁻¹1/D, Sherman & Morrison (1950) gives S⁻¹ and |S| of S = R + 1·P·1':
     e'S⁻¹e = y'(R⁻¹ - R⁻¹11'R⁻¹/D)y + (u'y - x)²/(P + 1/D),  |S| = |R|·(1 + P·D).
     """
     shares, parities, noises, sizes = (np.ascontiguousarray(part) for part in zip(*map(_weighed, noise), strict=True))
@@ -108,14 +94,23 @@ def _zero_sum_basis(gyros: int) -> np.ndarray:
     return basis
 
 
-def _weighed(noise: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]:
+class _Weighed(NamedTuple):
     """Of one R: R⁻¹1/1'R⁻¹1 without its first [N-1], what makes y_i - y_0 white [N-1, N-1], 1/1'R⁻¹1, log|R|."""
+
+    share: np.ndarray
+    parity: np.ndarray
+    noise: float
+    size: float
+
+
+def _weighed(noise: np.ndarray) -> _Weighed:
     noise = np.asarray(noise, dtype=float)
     factor = _factor(noise)
     solved = np.linalg.solve(noise, np.ones(len(noise)))
     between = noise[1:, 1:] - noise[1:, :1] - noise[:1, 1:] + noise[0, 0]
     parity = np.linalg.inv(_factor(between))
-    return (solved / solved.sum())[1:], parity, 1.0 / solved.sum(), 2.0 * float(np.log(np.diag(factor)).sum())
+    size = 2.0 * float(np.log(np.diag(factor)).sum())
+    return _Weighed((solved / solved.sum())[1:], parity, 1.0 / solved.sum(), size)
 
 
 def _factor(noise: np.ndarray) -> np.ndarray:
@@ -127,7 +122,7 @@ def _factor(noise: np.ndarray) -> np.ndarray:
         raise not_positive_definite(0) from None
 
 
-def _symmetric(matrix: np.ndarray) -> np.ndarray:
+def _symmetric(matrix: Floats) -> Floats:
     return (matrix + matrix.T) / 2
 
 

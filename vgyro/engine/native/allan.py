@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
+from vgyro.engine.models import LossyDifferences
 from vgyro.engine.native import _allan, pool
 from vgyro.engine.native.allan_freedom import degrees_of_freedom, limits
 
@@ -26,20 +28,7 @@ def differences(
     share: int = 2,
     kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the squared differences of means whose mean is an Allan variance, and how many there are.
-
-    rate    : array [T], deg/s
-    factors : array [M] int, averaging factors m; τ = m sample periods
-    edges   : array [S + 1] int, first sample of each gap-free stretch, and T; None: there is no gap
-    share   : stretches of less than share·m samples are left out, and those with a single difference
-    kind    : overlapping, modified or hadamard
-    returns : sums [M] in (deg/s)², counts [M]; sums / counts is the variance. Zeros where no stretch is long enough.
-    Of the angle θ, over all k, Riley, NIST SP 1065, eq. 11, 15 and 19:
-        overlapping  (θ[k+2m] - 2θ[k+m] + θ[k])² / 2τ²
-        modified     ((1/m) Σ_{j=k}^{k+m-1} (θ[j+2m] - 2θ[j+m] + θ[j]))² / 2τ²
-        hadamard     (θ[k+3m] - 3θ[k+2m] + 3θ[k+m] - θ[k])² / 6τ²
-    Differences are summed in blocks of 2048, the blocks pairwise.
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.differences; summed in blocks of 2048, the blocks pairwise."""
     edges = _edges(rate, edges)
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     sums, counts = np.zeros(len(factors)), np.zeros(len(factors), dtype=np.int64)
@@ -57,13 +46,12 @@ def differences(
     return sums, counts
 
 
-def _summed(
-    angle: np.ndarray, edges: np.ndarray, factors: np.ndarray, most: np.ndarray, share: int, kind: str
-) -> np.ndarray:
+def _summed(angle: Floats, edges: Ints, factors: Ints, most: Ints, share: int, kind: str) -> Floats:
     if kind == "modified":
         sums, share = np.empty(len(factors)), max(share, 3)
         pool.run(lambda start, stop: _allan.averaged(angle, edges, factors, share, sums, start, stop), len(factors), 1)
-        return sums / factors.astype(float) ** 2
+        means: Floats = sums / factors.astype(float) ** 2
+        return means
     blocks = _blocks(np.diff(edges), most)
     parts = np.empty((len(factors), len(blocks)))
     pool.run(
@@ -71,17 +59,12 @@ def _summed(
         len(blocks),
         PIECE,
     )
-    return parts.sum(axis=1)
+    total: Floats = parts.sum(axis=1)
+    return total
 
 
 def slot_sums(rate: np.ndarray, slot: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sums of the samples before each border of a slot, and how many there are, in stretches in which samples are lost.
-
-    rate    : array [T], deg/s;  slot : array [T] int, place of each sample on an even time grid, rising
-    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
-    returns : total [P], of the samples about the mean of their stretch; have [P] int32. P = slots + S borders: those of
-              a stretch one after another, first and last included
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.slot_sums."""
     edges = np.ascontiguousarray(edges, dtype=np.int64)
     borders = int(edges[-1]) + len(edges) - 1
     total, have = np.zeros(borders), np.zeros(borders, dtype=np.int32)
@@ -98,19 +81,8 @@ def differences_over_losses(
     factors: np.ndarray,
     share: int = 3,
     kind: str = "overlapping",
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The same over stretches in which samples are lost: differences of the means of the samples that are there.
-
-    total, have, edges : of slot_sums;  factors : array [M] int, averaging factors m
-    share   : stretches of less than share·m slots are left out
-    kind    : overlapping, modified or hadamard
-    returns : sums [M] in (deg/s)²; excess [M]; counts [M]; possible [M], differences there would be without a loss
-    A mean over m slots counts where nine tenths of its samples are there, and a modified difference where nine tenths
-    of the differences that it averages do; nothing is put in the place of a lost sample. The samples of n out of m
-    slots have, where the noise is white, a mean of variance σ₁²/n, not σ₁²/m: excess·σ₁² / counts is what that adds to
-    sums / counts (for overlapping differences excess = Σ (1/n₁ + 1/n₂ - 2/m)/2), σ₁² the variance of a single sample.
-    From m = 128 on, differences begin `strides` slots apart; a modified one averages that many fewer.
-    """
+) -> LossyDifferences:
+    """As vgyro.engine.protocols.noise.AllanEngine.differences_over_losses; those begin `strides` slots apart."""
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     edges = np.ascontiguousarray(edges, dtype=np.int64)
     steps = strides(factors)
@@ -128,32 +100,28 @@ def differences_over_losses(
     if kind == "modified":
         # White noise of m slots: the modified variance is this part of the other one.
         found[:, 1] *= (factors**2 + 1) / (2 * factors**2)
-    return found[:, 0], found[:, 1], counts, possible_differences(factors, np.diff(edges), share, kind)
+    possible = possible_differences(factors, np.diff(edges), share, kind)
+    return LossyDifferences(found[:, 0], found[:, 1], counts, possible)
 
 
-def strides(factors: np.ndarray) -> np.ndarray:
+def strides(factors: Ints) -> Ints:
     """Slots between the differences over losses at each averaging factor."""
     return np.maximum(factors // DENSE, 1)
 
 
-def possible_differences(factors: np.ndarray, slots: np.ndarray, share: int, kind: str) -> np.ndarray:
+def possible_differences(factors: Ints, slots: Ints, share: int, kind: str) -> Ints:
     """Differences over losses at each factor [M], were nothing lost of stretches of `slots` [S]."""
     steps = strides(factors)
     reach = 2 * factors + (factors // steps - 1) * steps if kind == "modified" else ORDER[kind] * factors
     found = (slots - reach[:, None]) // steps[:, None] + 1
-    return np.where((slots >= share * factors[:, None]) & (slots >= reach[:, None]), found, 0).sum(axis=1)
+    possible: Ints = np.where((slots >= share * factors[:, None]) & (slots >= reach[:, None]), found, 0).sum(axis=1)
+    return possible
 
 
 def lag_products(
     rate: np.ndarray, factors: np.ndarray, edges: np.ndarray | None = None, fewest: int = 4
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Σ z² and Σ z z' of the means z of adjacent blocks of m samples, z' the following mean.
-
-    rate    : array [T];  factors : array [M] int, m; an incomplete last block is left out
-    edges   : as in differences;  fewest : means, at least 4; stretches with fewer are left out
-    returns : squares [M, 3], products [M, 3]: of the means about their line, of their differences about the mean
-              difference, of the second differences about theirs, each stretch by itself. Zeros without a stretch.
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.lag_products."""
     edges = _edges(rate, edges)
     factors = np.ascontiguousarray(factors, dtype=np.int64)
     squares, products = np.zeros((len(factors), 3)), np.zeros((len(factors), 3))

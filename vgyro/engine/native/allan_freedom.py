@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 FLATTEST = 2  # white noise of the angle
 MOST_TERMS = 100  # J_max of the paper
 
@@ -47,17 +49,7 @@ KINDS = {
 
 
 def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind: str = "overlapping") -> np.ndarray:
-    """Equivalent degrees of freedom of an Allan variance of gap-free stretches, from all its overlapping differences.
-
-    alpha   : exponent of the rate's power spectrum: 0 white, -1 flicker, -2 random walk, 1 and 2 noise of the angle
-    factor  : averaging factor m;  samples : array [S] of the rates in each stretch, at least as many as one difference
-              needs: 2m, and 3m for modified and hadamard
-    kind    : overlapping, modified or hadamard
-    returns : array of the shape of `samples`
-    Greenhall & Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003: d = 2, and d = 3 for
-    hadamard; F = m, and F = 1 for modified; S = m. An exponent for which a variance does not exist counts as the
-    nearest for which it does.
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.degrees_of_freedom."""
     variance = KINDS[kind]
     alpha = min(max(alpha, variance.steepest), FLATTEST)
     count = variance.count(np.atleast_1d(np.asarray(samples, dtype=float)), factor)
@@ -81,7 +73,7 @@ def _white_angle(d: int) -> tuple[float, float]:
 
 
 def limits(deviation: np.ndarray, edf: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper chi² limits of deviations with `edf` degrees of freedom.  Riley, NIST SP 1065, eq. 45."""
+    """As vgyro.engine.protocols.noise.AllanEngine.limits."""
     from scipy.special import chdtri
 
     tail = (1 - confidence) / 2
@@ -117,7 +109,7 @@ class _Shape:
     alpha: int
     filter_factor: float
 
-    def exact(self, count: np.ndarray, terms: np.ndarray, stride: float, level: float | None = None) -> np.ndarray:
+    def exact(self, count: Floats, terms: Floats, stride: float, level: float | None = None) -> Floats:
         """M·s(0)² / Σ_j (1 - |j|/M) s(j/S)², |j| <= J: eq. 10 and 13; level: s(0)² where it is known."""
         most = int(terms.max(initial=0))
         lag = np.arange(most + 1)
@@ -125,7 +117,8 @@ class _Shape:
         weight = np.where(lag < terms[:, None], 2.0, np.where(lag == terms[:, None], 1.0, 0.0))
         weight[:, 0] = 1.0
         sums = (weight * (1 - lag / count[:, None])) @ squares
-        return (squares[0] if level is None else level) * count / sums
+        edf: Floats = (squares[0] if level is None else level) * count / sums
+        return edf
 
     def structure(self, t: np.ndarray) -> np.ndarray:
         """s_z of the paper, eq. 9."""
@@ -135,7 +128,7 @@ class _Shape:
             total = total + weight * (self._filtered(t - step) + self._filtered(t + step))
         return total
 
-    def _filtered(self, t: np.ndarray) -> np.ndarray:
+    def _filtered(self, t: Floats) -> Floats:
         """s_x, eq. 8."""
         if math.isinf(self.filter_factor):
             return _covariance(t, self.alpha + 2)
@@ -144,7 +137,7 @@ class _Shape:
         return self.filter_factor**2 * (2 * _covariance(t, self.alpha) - near)
 
 
-def _covariance(t: np.ndarray, alpha: int) -> np.ndarray:
+def _covariance(t: Floats, alpha: int) -> Floats:
     """s_w, eq. 7: -|t|, t² log|t|, |t|³, t⁴ log|t|, |t|⁵, … for alpha = 2, 1, 0, -1, -2, …"""
     size = np.abs(t)
     if alpha == 2:

@@ -38,23 +38,14 @@ STATES = np.array(
 def fit_dcc_windows(
     r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray, lags: int = 1
 ) -> DccWindows:
-    """Fit DCC(1,1) to each of K windows, with two-step standard errors and the test of constant correlation.
-
-    r                  : [K, T, N] deg/s
-    omega, alpha, beta : [K, N], ω in (deg/s)², all finite: the GARCH margins
-    status             : [K, N] uint8, their codes (GARCH_STATUSES)
-    lags               : of the test
-    returns            : DccWindows
-    raises             : EngineError for more than 32 series
-    Conventions as in vgyro.volatility.fit_dcc.
-    """
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc_windows; at most 32 series."""
     r = np.ascontiguousarray(r, dtype=float)
     margins = np.stack([np.asarray(part, dtype=float) for part in (omega, alpha, beta)])
     return _fit(r, margins, np.asarray(status), lags)
 
 
 def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None = None) -> DccFit:
-    """Fit DCC(1,1) to z [T, N]. See vgyro.volatility.fit_dcc for the conventions."""
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc; at most 32 series."""
     z = np.ascontiguousarray(z, dtype=float)
     n = z.shape[1]
     known = np.full((1, n), garch_code(CONVERGED), dtype=np.uint8)

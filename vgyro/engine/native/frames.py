@@ -20,7 +20,7 @@ FAMILIES = {"none": _frames.NO_CHECKSUM, "crc": _frames.CRC, "sum": _frames.SUM}
 
 
 class Finder:
-    """Candidates of one frame layout. A place counts if sync, constants and checksum are right, wherever it lies."""
+    """As vgyro.engine.protocols.reading.FrameFinder."""
 
     def __init__(self, frame: BinaryFrame) -> None:
         rule, fixed = frame.checksum, fixed_bytes(frame)
@@ -50,7 +50,7 @@ class Finder:
         )
 
     def find(self, buffer: np.ndarray) -> Candidates:
-        """Good and failed candidates of a buffer, uint8 [m]."""
+        """As vgyro.engine.protocols.reading.FrameFinder.find."""
         good, failed, place = [], [], 0
         room = len(buffer) // self._length + ROOM
         while place < len(buffer):
@@ -64,10 +64,7 @@ class Finder:
 def read_columns(
     buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[FrameColumn]
 ) -> list[np.ndarray]:
-    """Values of channels of the frames of `length` bytes that begin at `places`, each [n], in the channel's own type.
-
-    buffer : uint8 [m];  places : int64 [n], ascending
-    """
+    """As vgyro.engine.protocols.reading.FramesEngine.read_columns."""
     read = [np.empty(len(places), dtype=DTYPES[column.kind]) for column in columns]
     if not len(places):
         return read
@@ -82,11 +79,7 @@ def read_columns(
 
 
 def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int, modulus: int) -> np.ndarray:
-    """Rows that do not follow the one before: int64, ascending, row 0 always among them.
-
-    start   : int64 [n], offsets of frames of `length` bytes;  counter : int64 [n] as sent, or None
-    A row follows if it begins where the other ends and its counter is `step` more, modulo `modulus`.
-    """
+    """As vgyro.engine.protocols.reading.FramesEngine.breaks."""
     rows = np.empty(len(start), dtype=np.int64)
     if len(start):
         rows = rows[: _frames.breaks(start, counter, length, step, modulus, rows)].copy()
@@ -94,12 +87,7 @@ def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int
 
 
 def longest_run(values: np.ndarray, time: np.ndarray, since: float, least: float) -> tuple[Run | None, float]:
-    """The longest run of equal samples, and when the last sample's run began.
-
-    values : [n], n >= 1;  time : float64 [n], s, ascending
-    since  : when the run that values[0] belongs to began
-    least  : s; None is returned if no run is longer.  Of runs equally long the first counts.
-    """
+    """As vgyro.engine.protocols.reading.FramesEngine.longest_run."""
     # Only whether two integers are equal counts, not their sign.
     kind = f"i{values.itemsize}" if values.dtype.kind == "u" else values.dtype
     began, duration, last = _frames.longest_run(np.ascontiguousarray(values).view(kind), time, since, least)

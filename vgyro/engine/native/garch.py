@@ -25,14 +25,13 @@ LOG_2_PI = float(np.log(2 * np.pi))
 
 
 def fit_garch_windows(r: np.ndarray) -> GarchWindows:
-    """Fit GARCH(1,1) to each series of r [K, T, N], deg/s; a view of overlapping windows is not copied.
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch_windows; a view of overlapping windows is not copied.
 
-    raises : MemoryError
-    See vgyro.volatility.fit_garch for the conventions. A grid of 32 points (eight β, four α each, ω = 1 - α - β) and
-    one step of scoring from the constant variance at each β show where searches begin: at the local optima along β.
-    At eight more β the best trend of the variance with α = 0 shows where others begin.
-    A series with an e² above 20 mean squares gets 32 points more, with ω off that line, and all its starts are tried.
-    Each search is Newton's method with the analytic Hessian (Fiorentini, Calzolari & Panattoni 1996).
+    A grid of 32 points (eight β, four α each, ω = 1 - α - β) and one step of scoring from the constant variance at
+    each β show where searches begin: at the local optima along β. At eight more β the best trend of the variance with
+    α = 0 shows where others begin. A series with an e² above 20 mean squares gets 32 points more, with ω off that
+    line, and all its starts are tried. Each search is Newton's method with the analytic Hessian (Fiorentini, Calzolari
+    & Panattoni 1996).
     """
     r = np.require(r, dtype=float, requirements="A")
     windows, samples, n = r.shape
@@ -56,7 +55,7 @@ def fit_garch_windows(r: np.ndarray) -> GarchWindows:
 
 
 def fit_garch(r: np.ndarray) -> GarchFit:
-    """Fit GARCH(1,1) to each column of r [T, N], deg/s. See vgyro.volatility.fit_garch for the conventions."""
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch: fit_garch_windows of one window."""
     r = np.require(r, dtype=float, requirements="A")
     fit = fit_garch_windows(r[None])
     omega, alpha, beta = fit.omega[0], fit.alpha[0], fit.beta[0]

@@ -27,17 +27,10 @@ def kalman_filter(
     start: float,
     variance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The discrete Kalman filter of a scalar rate that N gyros measure: predict, then update, each sample.
+    """As vgyro.engine.protocols.filters.KalmanEngine.kalman_filter.
 
-    rate       : array [T, N], deg/s
-    transition : F, from one sample to the next
-    process    : variance of the step to each sample, (deg/s)²: one number, or an array [T]
-    noise      : covariance of a sample, (deg/s)²: array [N, N], or one for each sample [T, N, N]
-    start, variance : mean and variance before the first sample
-    returns    : estimate [T], deg/s, and its variance [T], (deg/s)², after each update
-    raises     : EngineError that names the first sample that is not finite or whose R is not positive definite
-    Kalman (1960), J. Basic Eng. 82, 35-45. P and x stay accurate for an ill-conditioned R: the common rate is taken out
-    before R is solved for, and P = K·P⁻ of one weighted mean has no cancellation.
+    P and x stay accurate for an ill-conditioned R: the common rate is taken out before R is solved for, and P = K·P⁻
+    of one weighted mean has no cancellation.
     """
     samples, gyros = rate.shape
     matrices = np.ascontiguousarray(noise, dtype=float).reshape(-1, gyros, gyros)
@@ -66,14 +59,7 @@ def kalman_filter(
 def rts_smoother(
     estimate: np.ndarray, variance: np.ndarray, transition: float, process: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The Rauch-Tung-Striebel smoother of what kalman_filter returned.
-
-    estimate, variance : arrays [T], deg/s and (deg/s)², after each update
-    transition, process : those of the filter
-    returns : smoothed estimate [T], deg/s, and its variance [T], (deg/s)²
-    raises  : EngineError that names the first sample that is not finite
-    Rauch, Tung & Striebel (1965), AIAA J. 3(8), 1445-1450.
-    """
+    """As vgyro.engine.protocols.filters.KalmanEngine.rts_smoother."""
     estimate, variance = np.ascontiguousarray(estimate, dtype=float), np.ascontiguousarray(variance, dtype=float)
     smoothed, spread = np.empty(len(estimate)), np.empty(len(estimate))
     if len(estimate):
@@ -86,12 +72,7 @@ def rts_smoother(
 
 
 def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, start: float) -> np.ndarray:
-    """x ← F·x, then x ← x + K(z - 1·x), with a fixed gain.
-
-    rate    : array [T, N], deg/s;  transition : F;  gain : K [N];  start : x before the first sample, deg/s
-    returns : x after each sample [T], deg/s
-    raises  : EngineError that names the first sample that is not finite
-    """
+    """As vgyro.engine.protocols.filters.KalmanEngine.constant_gain_filter."""
     driven = np.zeros(len(rate))
     for column, share in zip(rate.T, gain, strict=True):
         driven += np.multiply(column, share, dtype=float)
@@ -99,21 +80,12 @@ def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, 
 
 
 def low_pass(signal: np.ndarray, keep: float, gain: float, start: float) -> np.ndarray:
-    """First-order recursion y_k = keep·y_{k-1} + gain·signal_k, y_{-1} = start: [T] → [T].
-
-    raises : EngineError that names the first sample that is not finite
-    """
+    """As vgyro.engine.protocols.filters.KalmanEngine.low_pass."""
     return _run(signal, _kalman.low_pass, keep, gain, start)
 
 
 def settling_filter(signal: np.ndarray, keep: float, fading: float, start: float) -> np.ndarray:
-    """Random-walk filter with the analytic covariance of the time since its start: [T] → [T].
-
-    y_k = φ_k·y_{k-1} + (1 - φ_k)·signal_k, φ_k = keep·(1 - f_k)/(1 - f_{k+1}), f_k = fading·keep^(2k), y_{-1} = start.
-    keep : e^(-aT);  fading : c = (P0 - P∞)/(P0 + P∞)
-    raises : EngineError that names the first sample that is not finite
-    Xue et al. (2012), Measurement 45, 745-754; see vgyro.fusion.papers.rate_filters.xue_2012.
-    """
+    """As vgyro.engine.protocols.filters.KalmanEngine.settling_filter."""
     return _run(signal, _kalman.settling, keep, fading, start)
 
 

@@ -14,15 +14,7 @@ from vgyro.engine.native import _statespace
 def log_likelihood(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, skip: int = 0, regime: np.ndarray | None = None
 ) -> tuple[float, int]:
-    """Gaussian log-likelihood of a stretch by its innovations, and how many of them it is of.
-
-    z      : array [T], deg/s;  r : variance of its noise, (deg/s)², one or [T]; infinite: z says nothing there
-    skip   : first innovations that are not counted: with a wide start it is the likelihood given those samples
-    regime : array [T]: which transition and process lead to each sample; None: the first
-    returns : -½Σ(log 2π + log f + v²/f), and the number of terms
-    raises : EngineError that names the first sample that cannot be used
-    Schweppe (1965), IEEE Trans. Inf. Theory 11, 61-70.
-    """
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.log_likelihood."""
     z, r, flags, whole = checked(z, r, model, regime)
     if len(z) == 0:
         return 0.0, 0
@@ -38,10 +30,8 @@ def log_likelihood(
 def smooth(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean [T] and variance [T] of c'x_t given all samples of the stretch.
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.smooth.
 
-    z, r, regime : as in log_likelihood
-    raises       : EngineError that names the first sample that cannot be used
     The modified Bryson-Frazier form of the Rauch-Tung-Striebel smoother (Bierman 1973, Int. J. Control 18, 1251-1258):
     it inverts nothing, so that a noise without a white part and a state that does not move are no special cases. The
     forward pass is run twice, its state kept at the borders of chunks: memory does not grow with n² T.

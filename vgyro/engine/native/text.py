@@ -14,7 +14,7 @@ TYPES: dict[Cell, type] = {
 
 
 class Parser:
-    """Reads lines of one form."""
+    """As vgyro.engine.protocols.reading.LineParser."""
 
     def __init__(self, form: LineForm) -> None:
         self._form = form
@@ -24,11 +24,7 @@ class Parser:
         )  # fmt: skip
 
     def parse(self, data: np.ndarray, size: int, room: int) -> Parsed:
-        """Rows of data[:size], uint8, which ends with the end of a line; PAD bytes more must stand behind it.
-
-        room   : rows to read at most, > 0; it stops there, and also after some thousands of bad lines
-        raises : ValueError if data does not end as it must, or the form is none
-        """
+        """As vgyro.engine.protocols.reading.LineParser.parse; it also stops after BAD_ROOM bad lines."""
         check(data, size, self._form)
         columns: list[np.ndarray | None] = []
         for field in self._form.fields:

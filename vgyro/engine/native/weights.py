@@ -14,11 +14,7 @@ WINDOWS = 64
 
 
 def min_variance_weights(H: np.ndarray) -> np.ndarray:
-    """min w'Hw, Σw = 1, 0 ≤ w ≤ 1, for a stack of matrices.
-
-    H       : array [M, N, N], N ≤ 32
-    returns : w [M, N]; NaN where H cannot be used (vgyro.engine.covariance.usable)
-    raises  : EngineError for more gyros
+    """As vgyro.engine.protocols.volatility.WeightsEngine.min_variance_weights; at most 32 gyros.
 
     With Hx ≥ 1, x ≥ 0, x'(Hx - 1) = 0 the weights are x/Σx. The support is found by block principal pivoting from the
     full one (Portugal, Júdice & Vicente 1994; at last by Murty's single exchanges, 1974). A search from the support of
@@ -26,7 +22,6 @@ def min_variance_weights(H: np.ndarray) -> np.ndarray:
     matrix depend on nothing else. H is scaled by powers of two to a diagonal in [1, 4), which rounds nothing. Each
     system is solved by LDL' and refined, where a pivot is small with residuals in twice the working precision: w is
     exact to 1e-13 as long as H can be used.
-    Liu et al. (2015), eq. 15-16; they name an active-set method.
     """
     H = np.ascontiguousarray(H, dtype=float)
     _check_size(H.shape[2])
@@ -47,17 +42,7 @@ def conditional_weights(
     begin: int,
     end: int,
 ) -> ConditionalWeights:
-    """Minimum-variance weights along the conditional covariance H_t = D_t R_t D_t of K windows.
-
-    r                  : [K, L, N] deg/s; the models were fitted to the first `inside` samples, and start from their
-                         mean(e²) and from Q_1 = S. Leading rows with a value that is not finite take the first H
-    omega, alpha, beta : [K, N], ω in (deg/s)²
-    a, b, target       : [K], [K], [K, N, N] S; a = 0 is a constant correlation
-    begin, end         : the samples to weigh, 0 ≤ begin ≤ end ≤ L; H_t uses r up to t - 1
-    returns            : ConditionalWeights; equal weights where H_t cannot be used
-    raises             : EngineError for more than 32 gyros
-    Liu et al. (2015), eq. 1-6 and 15-16.
-    """
+    """As vgyro.engine.protocols.volatility.WeightsEngine.conditional_weights; at most 32 gyros."""
     omega, alpha, beta, a, b, target = (
         np.ascontiguousarray(array, dtype=float) for array in (omega, alpha, beta, a, b, target)
     )

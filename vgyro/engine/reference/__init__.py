@@ -21,7 +21,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     # The hash of a task's code follows import statements: modules that are loaded by name must stand here too.
-    from vgyro.engine.reference import adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights  # noqa: F401
+    from vgyro.engine.protocols.engines import Modules
+    from vgyro.engine.reference import adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights
+
+    # An error of types here: a module is not what its protocol says.
+    _modules: Modules = adaptive, allan, dcc, frames, garch, kalman, statespace, text, weights
 
 MODULES = ("adaptive", "garch", "dcc", "weights", "allan", "kalman", "statespace", "frames", "text")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine.finite import not_positive_definite, refuse_broken
 
 
@@ -16,16 +17,8 @@ def scale_bias_filter(
     state: np.ndarray,
     covariance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Extended Kalman filter of x = [w, ẇ, b_1..b_N, s_1..s_N] with y_i = (1 + s_i)·w + b_i + n_i, Σb = Σs = 0.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.scale_bias_filter.
 
-    rate       : array [T, N], deg/s, N >= 2;  period : of the samples, s
-    noise      : covariance of a sample [N, N], (deg/s)²
-    drive      : process noise of (w, ẇ) a sample [2, 2]; w follows from ẇ by w + period·ẇ
-    walk       : variance of a sample's step of each bias [N], (deg/s)²; s is constant
-    state, covariance : [2+2N], [2+2N, 2+2N], before the first sample. What they and `walk` hold along Σb and Σs is
-                 dropped: these sums are zero, and known to be, for ever
-    returns    : w after each sample [T], deg/s; state and covariance after the last
-    raises     : EngineError that names the first sample that is not finite, or if `noise` is not positive definite
     filterpy's ExtendedKalmanFilter with all 2+2N states; it updates by Joseph's form.
     """
     from filterpy.kalman import ExtendedKalmanFilter
@@ -49,10 +42,11 @@ def scale_bias_filter(
     return estimate, filter_.x[:, 0], filter_.P
 
 
-def _reading(x: np.ndarray) -> np.ndarray:
+def _reading(x: Floats) -> Floats:
     """(1 + s)·w + b [N, 1] of the state [2+2N, 1]."""
     biases, scales = np.split(x[2:], 2)
-    return (1.0 + scales) * x[0] + biases
+    reading: Floats = (1.0 + scales) * x[0] + biases
+    return reading
 
 
 def _slope(x: np.ndarray) -> np.ndarray:
@@ -71,14 +65,8 @@ def filter_bank(
     probability: np.ndarray,
     least: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Multiple-model estimate of a rate that is a random walk: a Kalman filter for each noise and each process noise.
+    """As vgyro.engine.protocols.filters.AdaptiveEngine.filter_bank.
 
-    rate     : array [T, N], deg/s, N >= 2
-    noise    : covariances of a sample [J, N, N], (deg/s)²;  process : variances of the step to each sample [K]
-    start, variance : mean and variance of every member before the first sample
-    probability : [J, K], of the members, before the first sample;  least : below it none falls
-    returns  : Σ p·x after each sample [T], deg/s; p after the last [J, K]; mean of p over the samples [J, K]
-    raises   : EngineError that names the first sample that is not finite, or if a `noise` is not positive definite
     One KalmanFilter of filterpy a member, and the densities of its N-dimensional innovations.
     """
     from filterpy.kalman import KalmanFilter

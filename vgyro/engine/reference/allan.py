@@ -11,6 +11,8 @@ import allantools
 import numpy as np
 from scipy.stats import chi2
 
+from vgyro.engine.models import LossyDifferences
+
 ESTIMATORS = {"overlapping": allantools.oadev, "modified": allantools.mdev, "hadamard": allantools.ohdev}
 REACH = {"overlapping": 2, "modified": 3, "hadamard": 3}
 D = {"overlapping": 2, "modified": 2, "hadamard": 3}
@@ -28,16 +30,7 @@ def differences(
     share: int = 2,
     kind: str = "overlapping",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the squared differences of means whose mean is an Allan variance, and how many there are.
-
-    rate    : array [T], deg/s
-    factors : array [M] int, ascending averaging factors m; τ = m sample periods
-    edges   : array [S + 1] int, first sample of each gap-free stretch, and T; None: there is no gap
-    share   : stretches of less than share·m samples are left out, and those with a single difference
-    kind    : overlapping, modified or hadamard
-    returns : sums [M] in (deg/s)², counts [M]; sums / counts is the variance. Zeros where no stretch is long enough.
-    Riley, NIST SP 1065, eq. 11, 15 and 19.
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.differences, by allantools."""
     sums, counts = np.zeros(len(factors)), np.zeros(len(factors), dtype=np.int64)
     # Of a modified variance a stretch of 3m samples has two differences.
     spare = 0 if kind == "modified" else 1
@@ -53,13 +46,7 @@ def differences(
 
 
 def slot_sums(rate: np.ndarray, slot: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sums of the samples before each border of a slot, and how many there are, in stretches in which samples are lost.
-
-    rate    : array [T], deg/s;  slot : array [T] int, place of each sample on an even time grid, rising
-    edges   : array [S + 1] int, first slot of each stretch, and one past the last slot
-    returns : total [P], of the samples about the mean of their stretch; have [P] int32. P = slots + S borders: those of
-              a stretch one after another, first and last included
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.slot_sums, in NumPy."""
     totals, haves = [], []
     for start, stop in itertools.pairwise(edges.tolist()):
         inside = (slot >= start) & (slot < stop)
@@ -78,18 +65,9 @@ def differences_over_losses(
     factors: np.ndarray,
     share: int = 3,
     kind: str = "overlapping",
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The same over stretches in which samples are lost: differences of the means of the samples that are there.
+) -> LossyDifferences:
+    """As vgyro.engine.protocols.noise.AllanEngine.differences_over_losses, in NumPy.
 
-    total, have, edges : of slot_sums;  factors : array [M] int, averaging factors m
-    share   : stretches of less than share·m slots are left out
-    kind    : overlapping, modified or hadamard
-    returns : sums [M] in (deg/s)²; excess [M]; counts [M]; possible [M], differences there would be without a loss
-    A mean over m slots counts where nine tenths of its samples are there, and a modified difference where nine tenths
-    of the differences that it averages do; nothing is put in the place of a lost sample. The samples of n out of m
-    slots have, where the noise is white, a mean of variance σ₁²/n, not σ₁²/m: excess·σ₁² / counts is what that adds to
-    sums / counts (for overlapping differences excess = Σ (1/n₁ + 1/n₂ - 2/m)/2), σ₁² the variance of a single sample.
-    From m = 128 on, differences begin m // 64 slots apart; a modified one averages that many fewer.
     allantools would take a mean of any number of samples, or one that bridges any gap.
     """
     found = np.zeros((4, len(factors)))
@@ -98,7 +76,7 @@ def differences_over_losses(
         for row, m in enumerate(factors.tolist()):
             if share * m <= stop - start and REACH[kind] * m <= stop - start:
                 found[:, row] += _one_stretch(total[borders], have[borders], m, kind)
-    return found[0], found[1], found[2].astype(np.int64), found[3].astype(np.int64)
+    return LossyDifferences(found[0], found[1], found[2].astype(np.int64), found[3].astype(np.int64))
 
 
 def _one_stretch(total: np.ndarray, have: np.ndarray, m: int, kind: str) -> np.ndarray:
@@ -126,13 +104,7 @@ def _one_stretch(total: np.ndarray, have: np.ndarray, m: int, kind: str) -> np.n
 def lag_products(
     rate: np.ndarray, factors: np.ndarray, edges: np.ndarray | None = None, fewest: int = 4
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Σ z² and Σ z z' of the means z of adjacent blocks of m samples, z' the following mean.
-
-    rate    : array [T];  factors : array [M] int, m; an incomplete last block is left out
-    edges   : as in differences;  fewest : means, at least 4; stretches with fewer are left out
-    returns : squares [M, 3], products [M, 3]: of the means about their line, of their differences about the mean
-              difference, of the second differences about theirs, each stretch by itself. Zeros without a stretch.
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.lag_products, in NumPy."""
     squares, products = np.zeros((len(factors), 3)), np.zeros((len(factors), 3))
     for piece in _stretches(rate, edges):
         for row, factor in enumerate(factors):
@@ -157,14 +129,7 @@ def _stretches(rate: np.ndarray, edges: np.ndarray | None) -> list[np.ndarray]:
 
 
 def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind: str = "overlapping") -> np.ndarray:
-    """Equivalent degrees of freedom of an Allan variance of gap-free stretches, from all its overlapping differences.
-
-    alpha   : exponent of the rate's power spectrum: 0 white, -1 flicker, -2 random walk, 1 and 2 noise of the angle
-    factor  : averaging factor m;  samples : array [S] of the rates in each stretch
-    kind    : overlapping, modified or hadamard
-    returns : array of the shape of `samples`
-    Greenhall & Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003.
-    """
+    """As vgyro.engine.protocols.noise.AllanEngine.degrees_of_freedom, by allantools."""
     d, modified = D[kind], kind == "modified"
     alpha = min(max(alpha, STEEPEST[kind]), FLATTEST)
     edf = []
@@ -182,6 +147,6 @@ def degrees_of_freedom(alpha: int, factor: int, samples: np.ndarray | int, kind:
 
 
 def limits(deviation: np.ndarray, edf: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper chi² limits of deviations with `edf` degrees of freedom.  Riley, NIST SP 1065, eq. 45."""
+    """As vgyro.engine.protocols.noise.AllanEngine.limits."""
     tail = (1 - confidence) / 2
     return deviation * np.sqrt(edf / chi2.ppf(1 - tail, edf)), deviation * np.sqrt(edf / chi2.ppf(tail, edf))

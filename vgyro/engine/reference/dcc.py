@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine.constant import (
     constant_correlation_statistic,
     constant_fit,
@@ -50,7 +51,7 @@ HESSIAN_STEP = 1e-4
 def fit_dcc_windows(
     r: np.ndarray, omega: np.ndarray, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray, lags: int = 1
 ) -> DccWindows:
-    """Fit DCC(1,1) to each of K windows: `fit_dcc` in a loop. See vgyro.engine.native.dcc.fit_dcc_windows."""
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc_windows: fit_dcc in a loop."""
     fits, statistics = [], []
     for k in range(len(r)):
         window = np.ascontiguousarray(r[k], dtype=float)
@@ -80,7 +81,7 @@ def fit_dcc_windows(
 
 
 def fit_dcc(z: np.ndarray, r: np.ndarray | None = None, margins: GarchFit | None = None) -> DccFit:
-    """Fit DCC(1,1) to z [T, N]. See vgyro.volatility.fit_dcc for the conventions."""
+    """As vgyro.engine.protocols.volatility.DccEngine.fit_dcc; by SLSQP from several starts."""
     # Contiguous: the rounding of a sum depends on the stride.
     z = np.ascontiguousarray(z, dtype=float)
     n = z.shape[1]
@@ -207,15 +208,18 @@ class _Margins:
     def n_params(self, _series: int) -> int:
         return 3
 
-    def full_params(self, series: int) -> np.ndarray:
-        return self._parameters[series].copy()
+    def full_params(self, series: int) -> Floats:
+        parameters: Floats = self._parameters[series].copy()
+        return parameters
 
-    def per_obs_loglik(self, series: int, parameters: np.ndarray) -> np.ndarray:
+    def per_obs_loglik(self, series: int, parameters: Floats) -> Floats:
         variance = self._variance(series, parameters)
-        return -0.5 * (np.log(2 * np.pi) + np.log(variance) + np.square(self._e[:, series]) / variance)
+        likelihood: Floats = -0.5 * (np.log(2 * np.pi) + np.log(variance) + np.square(self._e[:, series]) / variance)
+        return likelihood
 
-    def std_resid_at(self, series: int, parameters: np.ndarray) -> np.ndarray:
-        return self._e[:, series] / np.sqrt(self._variance(series, parameters))
+    def std_resid_at(self, series: int, parameters: Floats) -> Floats:
+        residual: Floats = self._e[:, series] / np.sqrt(self._variance(series, parameters))
+        return residual
 
     def _variance(self, series: int, parameters: np.ndarray) -> np.ndarray:
         omega, alpha, beta = parameters[:, None]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from vgyro.arrays import Bools, Ints
 from vgyro.board import TYPE_BYTES, BinaryFrame, ByteOrder, Checksum
 from vgyro.engine.checksums import crc_tables, mask
 from vgyro.engine.frames import DTYPES, Candidates, FrameColumn, Run, fixed_bytes
@@ -14,13 +15,13 @@ Verifier = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class Finder:
-    """Candidates of one frame layout. A place counts if sync, constants and checksum are right, wherever it lies."""
+    """As vgyro.engine.protocols.reading.FrameFinder."""
 
     def __init__(self, frame: BinaryFrame) -> None:
         self._length, self._fixed, self._verify = frame.length, fixed_bytes(frame), verifier(frame)
 
     def find(self, buffer: np.ndarray) -> Candidates:
-        """Good and failed candidates of a buffer, uint8 [m]."""
+        """As vgyro.engine.protocols.reading.FrameFinder.find."""
         places = self._sync_places(buffer)
         good = self._verify(buffer, places)
         return Candidates(places[good], places[~good])
@@ -41,10 +42,7 @@ class Finder:
 def read_columns(
     buffer: np.ndarray, places: np.ndarray, length: int, columns: Sequence[FrameColumn]
 ) -> list[np.ndarray]:
-    """Values of channels of the frames of `length` bytes that begin at `places`, each [n], in the channel's own type.
-
-    buffer : uint8 [m];  places : int64 [n], ascending
-    """
+    """As vgyro.engine.protocols.reading.FramesEngine.read_columns."""
     if not len(places):
         return [np.empty(0, dtype=DTYPES[column.kind]) for column in columns]
     frames = np.lib.stride_tricks.sliding_window_view(buffer, length)[places]
@@ -52,11 +50,7 @@ def read_columns(
 
 
 def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int, modulus: int) -> np.ndarray:
-    """Rows that do not follow the one before: int64, ascending, row 0 always among them.
-
-    start   : int64 [n], offsets of frames of `length` bytes;  counter : int64 [n] as sent, or None
-    A row follows if it begins where the other ends and its counter is `step` more, modulo `modulus`.
-    """
+    """As vgyro.engine.protocols.reading.FramesEngine.breaks."""
     if not len(start):
         return np.empty(0, dtype=np.int64)
     follows = np.diff(start) == length
@@ -67,12 +61,7 @@ def breaks(start: np.ndarray, length: int, counter: np.ndarray | None, step: int
 
 
 def longest_run(values: np.ndarray, time: np.ndarray, since: float, least: float) -> tuple[Run | None, float]:
-    """The longest run of equal samples, and when the last sample's run began.
-
-    values : [n], n >= 1;  time : float64 [n], s, ascending
-    since  : when the run that values[0] belongs to began
-    least  : s; None is returned if no run is longer.  Of runs equally long the first counts.
-    """
+    """As vgyro.engine.protocols.reading.FramesEngine.longest_run."""
     first = np.insert(np.flatnonzero(values[1:] != values[:-1]) + 1, 0, 0)
     last = np.append(first[1:], len(values)) - 1
     began = time[first]
@@ -83,14 +72,15 @@ def longest_run(values: np.ndarray, time: np.ndarray, since: float, least: float
     return found, float(began[-1])
 
 
-def checksum(data: np.ndarray, rule: Checksum) -> np.ndarray:
+def checksum(data: Ints, rule: Checksum) -> Ints:
     """Checksum of each row of `data`.
 
     data    : uint8 [n, m], the covered bytes alone; the rule's padding is added here
     returns : uint64 [n]
     """
     if rule.family == "sum":
-        return data.sum(axis=1, dtype=np.uint64) & np.uint64(mask(rule.width))
+        sums: Ints = data.sum(axis=1, dtype=np.uint64) & np.uint64(mask(rule.width))
+        return sums
     if rule.family != "crc":
         raise ValueError(f"a {rule.family} checksum is not one of binary frames")
     zeros, tables = crc_tables(rule, data.shape[1])
@@ -114,7 +104,7 @@ def verifier(frame: BinaryFrame) -> Verifier:
         # Made once: building the tables for every chunk would cost more than using them.
         zeros, tables = crc_tables(rule, last - first)
 
-    def verify(buffer: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def verify(buffer: Ints, places: Ints) -> Bools:
         if rule.family == "crc":
             found = np.full(len(places), zeros, tables.dtype)
             for offset, table in enumerate(tables, first):
@@ -123,8 +113,10 @@ def verifier(frame: BinaryFrame) -> Verifier:
             total = np.insert(np.cumsum(buffer, dtype=np.uint64), 0, np.uint64(0))
             found = (total[places + last] - total[places + first]) & np.uint64(mask(rule.width))
         if rule.at is None:
-            return found == rule.equals
-        return found == stored_value(buffer, places + rule.at, rule.width // 8, order)
+            good: Bools = found == rule.equals
+            return good
+        good = found == stored_value(buffer, places + rule.at, rule.width // 8, order)
+        return good
 
     return verify
 

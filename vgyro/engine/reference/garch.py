@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine import status as rules
 from vgyro.engine.models import (
     CONVERGED,
@@ -45,7 +46,7 @@ class _Series:
 
 
 def fit_garch(r: np.ndarray) -> GarchFit:
-    """Fit GARCH(1,1) to each column of r [T, N], deg/s. See vgyro.volatility.fit_garch for the conventions."""
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch; each column by arch, from the best of its starts."""
     r = np.asarray(r, dtype=float)
     fits, scales = [], []
     # Contiguous columns: the rounding of a mean depends on the stride.
@@ -70,7 +71,7 @@ def fit_garch(r: np.ndarray) -> GarchFit:
 
 
 def fit_garch_windows(r: np.ndarray) -> GarchWindows:
-    """fit_garch of each window of r [K, T, N], deg/s."""
+    """As vgyro.engine.protocols.volatility.GarchEngine.fit_garch_windows: fit_garch of each window."""
     windows, _, n = r.shape
     omega, alpha, beta, likelihood = (np.full((windows, n), np.nan) for _ in range(4))
     stderr, status = np.full((windows, n, 3), np.nan), np.zeros((windows, n), dtype=np.uint8)
@@ -157,11 +158,12 @@ def _starts(e: np.ndarray) -> list[np.ndarray]:
     return starts
 
 
-def _stderr(result: Any) -> np.ndarray:
+def _stderr(result: Any) -> Floats:
     """Bollerslev & Wooldridge's robust standard errors, as arch computes them, but with 1/T where it has 1/(T - 1)."""
     try:
         with np.errstate(invalid="ignore"):
-            return np.asarray(result.std_err, dtype=float) * np.sqrt(1 - 1 / result.nobs)
+            stderr: Floats = np.asarray(result.std_err, dtype=float) * np.sqrt(1 - 1 / result.nobs)
+            return stderr
     except np.linalg.LinAlgError:
         return np.full(3, np.nan)
 

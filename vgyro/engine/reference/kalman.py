@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine.finite import not_positive_definite, refuse_broken
 
 if TYPE_CHECKING:
@@ -20,16 +21,7 @@ def kalman_filter(
     start: float,
     variance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The discrete Kalman filter of a scalar rate that N gyros measure: predict, then update, each sample.
-
-    rate       : array [T, N], deg/s
-    transition : F, from one sample to the next
-    process    : variance of the step to each sample, (deg/s)²: one number, or an array [T]
-    noise      : covariance of a sample, (deg/s)²: array [N, N], or one for each sample [T, N, N]
-    start, variance : mean and variance before the first sample
-    returns    : estimate [T], deg/s, and its variance [T], (deg/s)², after each update
-    raises     : EngineError that names the first sample that is not finite or whose R is not positive definite
-    """
+    """As vgyro.engine.protocols.filters.KalmanEngine.kalman_filter, by filterpy."""
     rate, noise = np.asarray(rate, dtype=float), np.asarray(noise, dtype=float)
     noises = np.broadcast_to(noise, (len(rate), *noise.shape[-2:]))
     steps = np.broadcast_to(process, len(rate))
@@ -52,13 +44,7 @@ def kalman_filter(
 def rts_smoother(
     estimate: np.ndarray, variance: np.ndarray, transition: float, process: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The Rauch-Tung-Striebel smoother of what kalman_filter returned.
-
-    estimate, variance : arrays [T], deg/s and (deg/s)², after each update
-    transition, process : those of the filter
-    returns : smoothed estimate [T], deg/s, and its variance [T], (deg/s)²
-    raises  : EngineError that names the first sample that is not finite
-    """
+    """As vgyro.engine.protocols.filters.KalmanEngine.rts_smoother, by filterpy."""
     refuse_broken("estimate", estimate)
     refuse_broken("variance", variance)
     if len(estimate) == 0:
@@ -75,34 +61,24 @@ def rts_smoother(
 
 
 def constant_gain_filter(rate: np.ndarray, transition: float, gain: np.ndarray, start: float) -> np.ndarray:
-    """x ← F·x, then x ← x + K(z - 1·x), with a fixed gain, by filterpy's steady-state steps.
-
-    rate    : array [T, N], deg/s;  transition : F;  gain : K [N];  start : x before the first sample, deg/s
-    returns : x after each sample [T], deg/s
-    raises  : EngineError that names the first sample that is not finite
-    """
+    """As vgyro.engine.protocols.filters.KalmanEngine.constant_gain_filter, by filterpy's steady-state steps."""
     return _steady_state(rate, transition, np.broadcast_to(gain, rate.shape), start)
 
 
-def low_pass(signal: np.ndarray, keep: float, gain: float, start: float) -> np.ndarray:
-    """First-order recursion y_k = keep·y_{k-1} + gain·signal_k, y_{-1} = start: [T] → [T], by scipy.signal.lfilter.
-
-    raises : EngineError that names the first sample that is not finite
-    """
+def low_pass(signal: Floats, keep: float, gain: float, start: float) -> Floats:
+    """As vgyro.engine.protocols.filters.KalmanEngine.low_pass, by scipy.signal.lfilter."""
     from scipy.signal import lfilter
 
     refuse_broken("signal", signal)
+    filtered: Floats
     filtered, _ = lfilter([gain], [1.0, -keep], np.asarray(signal, dtype=float), zi=[keep * start])
     return filtered
 
 
 def settling_filter(signal: np.ndarray, keep: float, fading: float, start: float) -> np.ndarray:
-    """Random-walk filter with the analytic covariance of the time since its start: [T] → [T].
+    """As vgyro.engine.protocols.filters.KalmanEngine.settling_filter.
 
-    y_k = φ_k·y_{k-1} + (1 - φ_k)·signal_k, φ_k = keep·(1 - f_k)/(1 - f_{k+1}), f_k = fading·keep^(2k), y_{-1} = start.
-    keep : e^(-aT);  fading : c = (P0 - P∞)/(P0 + P∞)
-    raises : EngineError that names the first sample that is not finite
-    Xue et al. (2012), Measurement 45, 745-754. filterpy's steady-state steps, given the gain 1 - φ_k of each sample.
+    filterpy's steady-state steps, given the gain 1 - φ_k of each sample.
     """
     faded = 1.0 - fading * keep ** (2.0 * np.arange(len(signal) + 1))
     return _steady_state(signal[:, None], 1.0, 1.0 - keep * faded[:-1, None] / faded[1:, None], start)

@@ -16,14 +16,7 @@ if TYPE_CHECKING:
 def log_likelihood(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, skip: int = 0, regime: np.ndarray | None = None
 ) -> tuple[float, int]:
-    """Gaussian log-likelihood of a stretch by its innovations, and how many of them it is of.
-
-    z      : array [T], deg/s;  r : variance of its noise, (deg/s)², one or [T]; infinite: z says nothing there
-    skip   : first innovations that are not counted: with a wide start it is the likelihood given those samples
-    regime : array [T]: which transition and process lead to each sample; None: the first
-    returns : -½Σ(log 2π + log f + v²/f), and the number of terms
-    raises : EngineError that names the first sample that cannot be used
-    """
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.log_likelihood, by filterpy."""
     z, r, flags, whole = checked(z, r, model, regime)
     variances = np.broadcast_to(r, len(z))
     total, seen, count = 0.0, 0, 0
@@ -42,11 +35,7 @@ def log_likelihood(
 def smooth(
     z: np.ndarray, r: float | np.ndarray, model: StateSpace, regime: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean [T] and variance [T] of c'x_t given all samples of the stretch, by filterpy's rts_smoother.
-
-    z, r, regime : as in log_likelihood
-    raises       : EngineError that names the first sample that cannot be used
-    """
+    """As vgyro.engine.protocols.filters.StateSpaceEngine.smooth, by filterpy's rts_smoother."""
     z, r, flags, whole = checked(z, r, model, regime)
     if len(z) == 0:
         return np.empty(0), np.empty(0)

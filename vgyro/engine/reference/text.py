@@ -45,7 +45,7 @@ class Misfit(Exception):
 
 
 class Parser:
-    """Reads lines of one form."""
+    """As vgyro.engine.protocols.reading.LineParser."""
 
     def __init__(self, form: LineForm) -> None:
         self._form = form
@@ -53,10 +53,10 @@ class Parser:
         self._end = b"*" if form.checksum else form.eol
 
     def parse(self, data: np.ndarray, size: int, room: int) -> Parsed:
-        """Rows of data[:size]; see vgyro.engine.native.text.Parser.parse."""
+        """As vgyro.engine.protocols.reading.LineParser.parse."""
         check(data, size, self._form)
         raw, at, line, other, first = data[:size].tobytes(), 0, 0, 0, -1
-        rows: list[list] = []
+        rows: list[list[object]] = []
         bad: list[tuple[int, int, int, int, int]] = []
         while at < size and len(rows) < room:
             stop = raw.index(self._form.eol, at)
@@ -73,7 +73,7 @@ class Parser:
         wrong = np.array(bad, dtype=np.int64).reshape(-1, 5)
         return Parsed(self._columns(rows), wrong, at, line, other, first)
 
-    def _columns(self, rows: list[list]) -> list[np.ndarray | None]:
+    def _columns(self, rows: list[list[object]]) -> list[np.ndarray | None]:
         columns: list[np.ndarray | None] = []
         for k, field in enumerate(self._form.fields):
             if field.kind in ("skip", "literal"):
@@ -84,7 +84,7 @@ class Parser:
             columns.append(np.array([row[k] for row in rows], dtype=kind).reshape(shape))
         return columns
 
-    def _row(self, line: bytes, offset: int) -> list | None:
+    def _row(self, line: bytes, offset: int) -> list[object] | None:
         """Values of the cells of a line; empty of an empty line; None of a line of another kind."""
         form, at = self._form, self._pass(line, 0)
         if line[at : at + 1] == form.eol:
@@ -105,8 +105,9 @@ class Parser:
             raise Misfit(CHECKSUM, 0)
         return self._cells(line, at, offset)
 
-    def _cells(self, line: bytes, at: int, offset: int) -> list:
-        form, values = self._form, []
+    def _cells(self, line: bytes, at: int, offset: int) -> list[object]:
+        form = self._form
+        values: list[object] = []
         for k, field in enumerate(form.fields):
             at = self._step(line, at, k) if k else at
             if form.delimiter == b" " and self._stops(line, at):
@@ -232,7 +233,7 @@ def integer(text: str) -> int | None:
     return value if abs(value) < 1 << 63 else None
 
 
-def _day(found: re.Match, order: str) -> int | None:
+def _day(found: re.Match[str], order: str) -> int | None:
     parts = found.groupdict()
     year = int(parts["Y"])
     if order == "ymd":
@@ -254,7 +255,7 @@ def _day(found: re.Match, order: str) -> int | None:
         return None
 
 
-def _time(found: re.Match) -> int | None:
+def _time(found: re.Match[str]) -> int | None:
     parts = found.groupdict()
     hour, minute, second = (int(parts[name] or parts[name + "2"] or 0) for name in "hms")
     fraction = parts["f"] or parts["f2"] or ""

@@ -6,8 +6,9 @@ import warnings
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.engine.covariance import conditional_covariance, usable
-from vgyro.engine.models import ConditionalWeights
+from vgyro.engine.models import ConditionalWeights, DccModel
 
 # One cvxpy problem holds this many small ones side by side, as the blocks of one quadratic form.
 BATCH = 2000
@@ -18,14 +19,11 @@ KKT = 1e-11
 
 
 def min_variance_weights(H: np.ndarray) -> np.ndarray:
-    """min w'Hw, Σw = 1, 0 ≤ w ≤ 1, for a stack of matrices.
+    """As vgyro.engine.protocols.volatility.WeightsEngine.min_variance_weights; of any number of gyros.
 
-    H       : array [M, N, N]
-    returns : w [M, N]; NaN where H cannot be used (vgyro.engine.covariance.usable)
     Where H⁻¹1 has no negative element it is the answer already, by its KKT conditions; the rest goes to cvxpy
     (Clarabel). Then the equality system is solved on the support, so that the weights are exact to rounding, and the
     KKT conditions are checked; a support that fails them is mended by single exchanges.
-    Liu et al. (2015), eq. 15-16; they name an active-set method.
     """
     good = usable(H)
     weights = np.full(H.shape[:2], np.nan)
@@ -54,17 +52,17 @@ def conditional_weights(
     begin: int,
     end: int,
 ) -> ConditionalWeights:
-    """Minimum-variance weights along the conditional covariance H_t of K windows, one window at a time.
+    """As vgyro.engine.protocols.volatility.WeightsEngine.conditional_weights, one window at a time.
 
-    Arguments and result as in vgyro.engine.native.weights. H_t comes from SciPy's filters, the weights from cvxpy.
+    H_t comes from SciPy's filters, the weights from cvxpy.
     """
     count, _, n = r.shape
     weights = np.empty((count, end - begin, n))
     deviation, sigma = np.empty_like(weights), np.empty(weights.shape[:2])
     good = np.empty(weights.shape[:2], dtype=bool)
     for k in range(count):
-        path = conditional_covariance(r[k], inside, omega[k], alpha[k], beta[k], float(a[k]), float(b[k]), target[k])
-        H = path[begin:end]
+        model = DccModel(omega[k], alpha[k], beta[k], float(a[k]), float(b[k]), target[k])
+        H = conditional_covariance(r[k], inside, model)[begin:end]
         weights[k] = min_variance_weights(H)
         good[k] = ~np.isnan(weights[k]).any(axis=1)
         weights[k, ~good[k]] = 1.0 / n
@@ -114,11 +112,12 @@ def _polish(H: np.ndarray, start: np.ndarray) -> np.ndarray:
     return weights
 
 
-def _violation(H: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _violation(H: Floats, weights: Floats) -> Floats:
     """Relative fall of the variance as a gyro's weight rises from zero [M, N]: > 0 breaks the KKT conditions."""
     gradient = np.einsum("kij,kj->ki", H, weights)
     variance = np.einsum("ki,ki->k", gradient, weights)
-    return 1.0 - gradient / variance[:, None]
+    violation: Floats = 1.0 - gradient / variance[:, None]
+    return violation
 
 
 def _on_support(H: np.ndarray, support: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
 from vgyro.fusion.types import ArrayRates
@@ -58,15 +59,16 @@ class SlowBlocks:
         """Time since the block before [B], s; 0 for the first."""
         return np.diff(self.time, prepend=self.time[:1])
 
-    def mean(self, values: np.ndarray) -> np.ndarray:
+    def mean(self, values: Floats) -> Floats:
         """Means [B] of the values [T] of the samples, in double precision."""
-        return np.add.reduceat(values, self.first, dtype=float) / self.length
+        means: Floats = np.add.reduceat(values, self.first, dtype=float) / self.length
+        return means
 
     def all(self, values: np.ndarray) -> np.ndarray:
         """Is it so in every sample of the block [B]? values [T] of bool"""
         return np.logical_and.reduceat(values, self.first)
 
-    def mean_of(self, first: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def mean_of(self, first: Ints, values: Floats) -> Floats:
         """Means [B, N] of what is constant from one sample to another.
 
         first [M] : samples from which the values [M, N] hold, each until the next; increasing. Before the first of them
@@ -76,7 +78,10 @@ class SlowBlocks:
         edges = np.union1d(first[(first > 0) & (first < stop)], self.first)
         held = values[np.maximum(np.searchsorted(first, edges, side="right") - 1, 0)]
         lasting = np.diff(edges, append=stop)[:, None]
-        return np.add.reduceat(held * lasting, np.searchsorted(edges, self.first), axis=0) / self.length[:, None]
+        means: Floats = (
+            np.add.reduceat(held * lasting, np.searchsorted(edges, self.first), axis=0) / self.length[:, None]
+        )
+        return means
 
     def pieces(self, rows: slice) -> Iterator[tuple[slice, slice]]:
         """Pieces of the samples `rows`, each in one stretch, and the blocks whose middles lie in and next to each."""
@@ -91,7 +96,7 @@ class SlowBlocks:
             high = int(np.searchsorted(middle, stop - 1, side="left")) + 1
             yield slice(start, stop), slice(max(low, int(begin[number])), min(high, int(end[number])))
 
-    def between(self, samples: slice, near: slice, values: np.ndarray) -> np.ndarray:
+    def between(self, samples: slice, near: slice, values: Floats) -> Floats:
         """Values [B] of the blocks at a piece of the samples: linear between middles, held beyond the last ones."""
         return np.interp(np.arange(samples.start, samples.stop), self.middle[near], values[near])
 

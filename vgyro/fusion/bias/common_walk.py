@@ -52,7 +52,8 @@ def common_walk(scales: AllanScales | None) -> float:
     before, after = (drift - one for drift, (_, one) in zip(drifts, last, strict=True))
     slope = math.log(after / before) / math.log(longest / float(scales.tau[-2])) if before > 0.0 else SLOPES[1]
     further = max(LONGEST * (pairs + 1.0), 1.0)
-    return 3.0 * after / longest * further ** (min(max(slope, SLOPES[0]), SLOPES[1]) - 1.0)
+    walk: float = 3.0 * after / longest * further ** (min(max(slope, SLOPES[0]), SLOPES[1]) - 1.0)
+    return walk
 
 
 def walk_correlation(noise: ArrayNoise) -> np.ndarray:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.errors import DataError
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.common_walk import common_note
@@ -204,14 +205,15 @@ def _of_followed(found: Followed, constant_rate: bool) -> str:
     return f"regressed on the temperature ({compared}): differences of the slopes between gyros are seen; {seen}"
 
 
-def combined_without(array: ArrayRates, weights: Weights, slow: SlowErrors) -> np.ndarray:
+def combined_without(array: ArrayRates, weights: Weights, slow: SlowErrors) -> Floats:
     """Σ u_i·(y_i - b̂_i) of the samples [T], deg/s.
 
     weights : [N], [T, N] or SampleWeights;  b̂ is linear between the middles of its blocks
     A piece at a time: beside the result little is made that is as long as the recording.
     """
     if isinstance(weights, np.ndarray) and weights.ndim == 1:
-        return combined(array.rate, weights) - slow.at_samples(slow.bias @ weights)
+        combined_rate: Floats = combined(array.rate, weights) - slow.at_samples(slow.bias @ weights)
+        return combined_rate
     fused, first = np.empty(len(array.rate)), 0
     for shares in weights.pieces() if isinstance(weights, SampleWeights) else [weights]:
         rows = slice(first, first + len(shares))
@@ -224,7 +226,7 @@ def combined_without(array: ArrayRates, weights: Weights, slow: SlowErrors) -> n
     return fused
 
 
-def slow_variance(weights: Weights, slow: SlowErrors) -> np.ndarray:
+def slow_variance(weights: Weights, slow: SlowErrors) -> Floats:
     """Variance of Σ u_i·(b_i - b̂_i) in each block [B], (deg/s)²: u'Pu.
 
     weights : [N], [B, N] or SampleWeights, of which those of each block's middle count
@@ -233,7 +235,8 @@ def slow_variance(weights: Weights, slow: SlowErrors) -> np.ndarray:
         weights = _at_middles(weights, slow.blocks)
     if weights.ndim == 1:
         return slow.covariance @ weights @ weights
-    return np.einsum("bi,bij,bj->b", weights, slow.covariance, weights)
+    variance: Floats = np.einsum("bi,bij,bj->b", weights, slow.covariance, weights)
+    return variance
 
 
 def _at_middles(weights: SampleWeights, blocks: SlowBlocks) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.choice import Choice, choose, quick_gains
 from vgyro.fusion.bias.common_walk import common_walk
-from vgyro.fusion.bias.model import BiasEvidence, Walk
+from vgyro.fusion.bias.model import BiasEvidence, BlockNoise, Regressor, Walk
 from vgyro.fusion.types import ArrayRates, FilterParameters, TemperatureAtRest
 
 CONTRADICTED = "the differences contradict the temperature coefficients of the record at rest: these are not used"
@@ -126,9 +126,9 @@ class BiasCase:
         return Followed(evidence, choice, common, regressor, reference, known, course, tau_s, note)
 
     def _evidence(self, regressor: np.ndarray | None, common: float, known: TemperatureAtRest | None) -> BiasEvidence:
-        return BiasEvidence.of(
-            self.array, self.blocks, self.variance, self.correlation, self.resting, regressor, common, known
-        )
+        noise = BlockNoise(self.variance, self.correlation)
+        slopes = None if regressor is None else Regressor(regressor, known)
+        return BiasEvidence.of(self.array, self.blocks, noise, self.resting, slopes, common)
 
     def _or_course(self, plain: Followed) -> Followed:
         """The likeliest course where the walks alone are far from those of the record, and it is likelier than they.

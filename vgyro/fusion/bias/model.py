@@ -11,10 +11,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.errors import DataError
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.common_walk import walk_correlation
@@ -45,6 +46,27 @@ class Walk:
     def parameters(self) -> int:
         """How many numbers were chosen."""
         return {"given": 0, "together": 1, "each": len(self.rrw)}[self.how] + math.isfinite(self.tau_s)
+
+
+class BlockNoise(NamedTuple):
+    """Noise of the gyros, block by block.
+
+    variance    : [B, N], (deg/s)² of a sample; not finite or not above 0: the gyro says nothing in this block
+    correlation : [N, N]
+    """
+
+    variance: np.ndarray
+    correlation: np.ndarray
+
+
+class Regressor(NamedTuple):
+    """What a part of the biases goes with: the temperature [B], K about a reference, or another series.
+
+    known : slopes of a record at rest; None: nothing is known of them
+    """
+
+    values: np.ndarray
+    known: TemperatureAtRest | None = None
 
 
 @dataclass(frozen=True)
@@ -83,21 +105,17 @@ class BiasEvidence:
         cls,
         array: ArrayRates,
         blocks: SlowBlocks,
-        variance: np.ndarray,
-        correlation: np.ndarray,
+        noise: BlockNoise,
         resting: np.ndarray,
-        temperature: np.ndarray | None,
+        regressor: Regressor | None = None,
         common: float = 0.0,
-        slopes: TemperatureAtRest | None = None,
     ) -> BiasEvidence:
         """All blocks of a recording.
 
-        variance    : [B, N], (deg/s)² of a sample; not finite or not above 0: the gyro says nothing in this block
-        correlation : [N, N] of the noise;  resting : [B] of bool, the board stands still for certain
-        temperature : [B], K about a reference, or another regressor; None: no slopes
-        common      : variance of a walk that all share
-        slopes      : those of a record at rest; None: nothing is known of them
+        resting   : [B] of bool, the board stands still for certain
+        regressor : None: no slopes;  common : variance of a walk that all share
         """
+        variance, correlation = noise
         used = np.isfinite(variance) & (variance > 0) & ~blocks.at_fault(array)
         weight = _inverse_covariance(used, variance / blocks.length[:, None], correlation)
         total = weight.sum(axis=2)
@@ -106,14 +124,14 @@ class BiasEvidence:
         weight[~resting & ~parity] = 0.0
         means = np.stack([blocks.mean(column) for column in array.rate.T], axis=1)
         root = None
-        if slopes is not None and temperature is not None:
-            means -= np.outer(temperature, slopes.slope)
-            root = root_of(slopes.covariance)
+        if regressor is not None and regressor.known is not None:
+            means -= np.outer(regressor.values, regressor.known.slope)
+            root = root_of(regressor.known.covariance)
         # G1 = 0: a rate that all share is taken out first, so that not even its rounding is left.
         shared = np.where(resting, 0.0, means.mean(axis=1))
         means -= shared[:, None]
         steps = blocks.steps(array)
-        design = _design(len(blocks), means.shape[1], steps, temperature, root)
+        design = _design(len(blocks), means.shape[1], steps, None if regressor is None else regressor.values, root)
         sizes = np.array([size**2 for _, _, size in steps])
         return cls(
             means,
@@ -132,7 +150,8 @@ class BiasEvidence:
     @property
     def gyros(self) -> int:
         """N."""
-        return self.means.shape[1]
+        gyros: int = self.means.shape[1]
+        return gyros
 
     @property
     def plain(self) -> int:
@@ -142,7 +161,8 @@ class BiasEvidence:
     @property
     def has_slopes(self) -> bool:
         """Temperature slopes are among the constants."""
-        return self.design.shape[2] > self.plain
+        has: bool = self.design.shape[2] > self.plain
+        return has
 
     @cached_property
     def unseen(self) -> np.ndarray:
@@ -269,8 +289,8 @@ def log_likelihood(filtered: Filtered, prior: np.ndarray) -> float:
 
 
 def log_likelihood_slope(
-    evidence: BiasEvidence, blocks: Information, filtered: Filtered, prior: np.ndarray, rrw: np.ndarray
-) -> np.ndarray:
+    evidence: BiasEvidence, blocks: Information, filtered: Filtered, prior: Floats, rrw: Floats
+) -> Floats:
     """Derivatives [N] of log_likelihood by log K_i, exactly.
 
     With respect to Q_t it is ½(rr' - Λ), and with constants β that are not known ½(E rr' - Λ) over their posterior.
@@ -285,7 +305,8 @@ def log_likelihood_slope(
     excess = np.tensordot(grown[:, None, None] * both, both, axes=([0, 2], [0, 2])) - np.tensordot(
         grown, weight, axes=1
     )
-    return rrw * ((excess * evidence.walks) @ rrw)
+    slope: Floats = rrw * ((excess * evidence.walks) @ rrw)
+    return slope
 
 
 def with_shared_slope(evidence: BiasEvidence, walk: Walk, bias: np.ndarray, constants: Constants) -> Constants:

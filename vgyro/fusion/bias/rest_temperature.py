@@ -15,7 +15,7 @@ from vgyro.fusion.bias.choice import choose
 from vgyro.fusion.bias.common_walk import common_walk
 from vgyro.fusion.bias.estimate import usual_arw
 from vgyro.fusion.bias.followed import blocks_temperature
-from vgyro.fusion.bias.model import BiasEvidence, Constants
+from vgyro.fusion.bias.model import BiasEvidence, BlockNoise, Constants, Regressor
 from vgyro.fusion.bias.prior import empirical_prior
 from vgyro.fusion.rest_scales import own_scales
 from vgyro.fusion.types import AllanScales, ArrayRates, CannotRun, TemperatureAtRest
@@ -53,7 +53,8 @@ def _constants(
 ) -> Constants | None:
     """Posterior of biases, steps and slopes; None where the slopes are not believed."""
     variance = np.tile(array.noise.arw**2 * array.rate_hz, (len(blocks), 1))
-    evidence = BiasEvidence.of(array, blocks, variance, array.noise.correlation, resting, relative, common)
+    noise = BlockNoise(variance, array.noise.correlation)
+    evidence = BiasEvidence.of(array, blocks, noise, resting, Regressor(relative), common)
     choice = choose(evidence, blocks, array.noise.rrw, usual_arw(variance, array.period), None)
     return empirical_prior(evidence, choice.filtered).posterior(choice.filtered) if choice.slopes else None
 

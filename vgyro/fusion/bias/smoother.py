@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 
 @dataclass(frozen=True)
 class Information:
@@ -121,12 +123,13 @@ def _filtered(
     return Filtered(state, covariance, keep, fade, grown, squares, -float(np.linalg.slogdet(keep)[1].sum()))
 
 
-def _fitted(blocks: Information, state: np.ndarray, updated: np.ndarray) -> np.ndarray:
+def _fitted(blocks: Information, state: Floats, updated: Floats) -> Floats:
     """Σ y'Gy - Σ e'We: e'We = e'Ge - (Ge)'P(Ge), with the updated P and e = y - x."""
     seen = blocks.matrix @ state
     left = blocks.vector - seen
     across = _summed(state, blocks.vector)
-    return across + across.T - _summed(state, seen) + _summed(left, updated @ left)
+    fitted: Floats = across + across.T - _summed(state, seen) + _summed(left, updated @ left)
+    return fitted
 
 
 def _summed(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.faults.candidate import NORMAL_MEDIAN
 from vgyro.fusion.types import ArrayRates
 
@@ -40,22 +41,25 @@ class BlockSums:
 
     @property
     def gyros(self) -> int:
-        return self.mean.shape[1] - 1
+        gyros: int = self.mean.shape[1] - 1
+        return gyros
 
     def __len__(self) -> int:
         return len(self.count)
 
-    def variance(self, gyro: int) -> np.ndarray:
+    def variance(self, gyro: int) -> Floats:
         """Variance of a gyro in each block [B], (deg/s)²."""
-        return self.moment[:, gyro, gyro] + 2.0 * self.moment[:, gyro, -1] + self.moment[:, -1, -1]
+        variance: Floats = self.moment[:, gyro, gyro] + 2.0 * self.moment[:, gyro, -1] + self.moment[:, -1, -1]
+        return variance
 
 
-def silent_share(sums: BlockSums) -> np.ndarray:
+def silent_share(sums: BlockSums) -> Floats:
     """Share of the blocks in which each gyro gives one value alone [N], of those in which it has rates."""
     together = sums.moment[:, -1, -1, None] + 2.0 * sums.moment[:, :-1, -1]
     own = together + np.diagonal(sums.moment, axis1=1, axis2=2)[:, :-1]
     silent = (own <= SILENT * np.max(own, axis=0)) & sums.alive
-    return silent.sum(axis=0) / np.maximum(sums.alive.sum(axis=0), 1)
+    share: Floats = silent.sum(axis=0) / np.maximum(sums.alive.sum(axis=0), 1)
+    return share
 
 
 def block_length(rate_hz: float, block_s: float) -> int:

@@ -119,14 +119,14 @@ def suspect_noise(
         found = _farthest(replace(state, level=level, counts=counts), block_s, threshold)
         if found is None:
             return
-        evidence, first, last, mean = found
+        evidence, (first, last), mean = found
         ratio, seconds = ratio_of(mean, state.share), (last - first) * block_s
         if ratio >= least_ratio(seconds):
             yield SuspectedFault(gyro, "burst" if seconds < burst_s else "noise", first, last, evidence, ratio, "1")
         level[first:last], counts[first:last] = 0.0, False
 
 
-def _farthest(state: NoiseLevel, block_s: float, threshold: float) -> tuple[float, int, int, float] | None:
+def _farthest(state: NoiseLevel, block_s: float, threshold: float) -> tuple[float, tuple[int, int], float] | None:
     """Evidence, first and last block, and mean level of the window that is farthest above the usual."""
     sums, usable = running_sum(state.level), running_sum(state.counts)
     best: tuple[float, int, int] | None = None
@@ -151,7 +151,7 @@ def _farthest(state: NoiseLevel, block_s: float, threshold: float) -> tuple[floa
     evidence = max(evidence, mean / state.spread[length] * np.sqrt(number / length))
     while last < len(state.counts) and not state.counts[last]:
         last += 1
-    return evidence, first, last, mean
+    return evidence, (first, last), mean
 
 
 def _unbroken(sums: np.ndarray, first: int, last: int, price: float) -> tuple[int, int]:

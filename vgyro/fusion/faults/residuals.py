@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.faults.block_sums import BlockSums
 from vgyro.runs import true_runs
 
@@ -197,7 +198,7 @@ def _filled(rate: np.ndarray, weight: np.ndarray, spoilt: Sequence[Spoilt], run:
     return filled
 
 
-def _good_share(bad: np.ndarray, weight: np.ndarray, gyro: int, spans: Sequence[Span]) -> np.ndarray:
+def _good_share(bad: Bools, weight: Floats, gyro: int, spans: Sequence[Span]) -> Floats:
     """Weights [N] of the others that are good all over a span, the first that has such; else of all others."""
     others = np.arange(bad.shape[1]) != gyro
     for first, last in spans:
@@ -207,7 +208,8 @@ def _good_share(bad: np.ndarray, weight: np.ndarray, gyro: int, spans: Sequence[
     else:
         good = others
     share = np.where(good, weight, 0.0)
-    return share / share.sum()
+    weights: Floats = share / share.sum()
+    return weights
 
 
 def _level(values: np.ndarray) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from vgyro.arrays import Bools
 from vgyro.config import FaultOptions
 from vgyro.fusion.events import FAULT_KINDS
 from vgyro.fusion.faults.block_sums import BlockSums
@@ -172,7 +173,7 @@ class State:
     def _spoilt(self) -> list[Spoilt]:
         return [*self.dead, *(Spoilt(one.gyro, one.first, one.last) for one in self.taken)]
 
-    def _counts(self, gyro: int, kinds: Sequence[str], edges: Sequence[str] = ()) -> np.ndarray:
+    def _counts(self, gyro: int, kinds: Sequence[str], edges: Sequence[str] = ()) -> Bools:
         """Blocks [B] without a fault of these kinds of that gyro, and without an end of one of the kinds `edges`.
 
         Only where at least two others are right.
@@ -181,7 +182,7 @@ class State:
         for one in self.taken:
             if one.gyro != gyro:
                 right[one.first : one.last, one.gyro] = False
-        counts = self.judged & right[:, gyro] & (right.sum(axis=1) > FEWEST_PARTNERS)
+        counts: Bools = self.judged & right[:, gyro] & (right.sum(axis=1) > FEWEST_PARTNERS)
         for one in self.taken:
             if one.gyro == gyro and one.kind in kinds:
                 counts[one.first : one.last] = False

@@ -12,9 +12,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.heavy_tails.scale_mixture import ScaleMixture
 
 CENTRE_S, FEWEST_CENTRE = 0.5, 16
@@ -70,6 +72,13 @@ class RateSetting:
     centre: int
     size: int
     reach: int = 0
+
+
+class Estimate(NamedTuple):
+    """Mean [n] and variance [n] of a rate, deg/s and (deg/s)²."""
+
+    mean: np.ndarray
+    variance: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -144,7 +153,7 @@ def improved(look: RateSamples, setting: RateSetting, local: Local) -> Local:
     rate, variance = _with_neighbours(look, alone, own, setting, local)
     known = np.where(seen, variance, 0.0)
     parts = [
-        _of_gyro(gyro, look, setting, precision[gyro], rate, known * look.used[gyro], local.size[gyro])
+        _of_gyro(gyro, look, setting, precision[gyro], Estimate(rate, known), local.size[gyro])
         for gyro in range(len(look.values))
     ]
     centre, size, residual = (np.stack(one) for one in zip(*parts, strict=True))
@@ -164,11 +173,10 @@ def _precision(
 
 
 def _of_gyro(
-    gyro: int, look: RateSamples, setting: RateSetting, precision: np.ndarray, rate: np.ndarray, known: np.ndarray,
-    before: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """m, s and y - m - ŵ [n] of one gyro from its precisions;  known : v [n] where it is used;  before : s so far"""
-    off = look.values[gyro] - rate
+    gyro: int, look: RateSamples, setting: RateSetting, precision: np.ndarray, rate: Estimate, before: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """m, s and y - m - ŵ [n] of one gyro from its precisions;  rate : ŵ, and v where it is known;  before : s so far"""
+    off, known = look.values[gyro] - rate.mean, rate.variance * look.used[gyro]
     mass = box(precision, setting.centre)
     enough = mass > 1e-9 * float(precision.max(initial=0.0))
     centre = np.where(enough, box(precision * off, setting.centre) / np.where(enough, mass, 1.0), setting.offset[gyro])
@@ -204,22 +212,21 @@ def _with_neighbours(
         return alone, own
     predicted = _predicted(alone, own, reach)
     extra = _extra(predicted - alone, own, setting.size)
-    jumped = _jumped(look, predicted - alone, predicted, extra, own, setting, before)
+    jumped = _jumped(look, predicted - alone, Estimate(predicted, extra), own, setting, before)
     extra[jumped | _near(look.borders, len(alone), reach)] = NOTHING * _usual(own)
     variance = 1.0 / (1.0 / own + 1.0 / extra)
     return variance * (alone / own + predicted / extra), variance
 
 
 def _jumped(
-    look: RateSamples, off: np.ndarray, predicted: np.ndarray, extra: np.ndarray, own: np.ndarray, setting: RateSetting,
-    before: Local,
-) -> np.ndarray:  # fmt: skip
+    look: RateSamples, off: np.ndarray, others: Estimate, own: np.ndarray, setting: RateSetting, before: Local
+) -> np.ndarray:
     """Samples [n] at which the gyros together are FAR from what the others predict;  off : how far they seem to be.
 
     What they say together is asked for without the prediction. Where they do not agree they say little, and no jump is
     seen.
     """
-    jumped = np.zeros(len(off), dtype=bool)
+    jumped, (predicted, extra) = np.zeros(len(off), dtype=bool), others
     places = np.flatnonzero(off**2 > 0.25 * FAR * (_usual(own) + extra))
     if places.size:
         some = RateSamples(look.values[:, places], look.used[:, places], np.empty(0, dtype=np.int64))
@@ -253,20 +260,22 @@ def _predicted(alone: np.ndarray, own: np.ndarray, reach: int) -> np.ndarray:
 
 
 @lru_cache
-def _kernel(reach: int) -> np.ndarray:
+def _kernel(reach: int) -> Floats:
     """Weights [2·reach + 1] of a parabola's value in the middle, by least squares without the middle."""
     x = np.arange(-reach, reach + 1) / reach
     design = np.stack([np.ones_like(x), x**2], axis=1)
     design[reach] = 0.0
-    return np.linalg.pinv(design)[0]
+    kernel: Floats = np.linalg.pinv(design)[0]
+    return kernel
 
 
-def _extra(left: np.ndarray, own: np.ndarray, window: int) -> np.ndarray:
+def _extra(left: Floats, own: Floats, window: int) -> Floats:
     """Variance [n] of a prediction about each place, from how far off it is [n]: with the sample's own taken off."""
     usual = np.minimum(own, UNSURE * _usual(own))
     square = np.minimum(left**2, FAR * np.maximum(np.median(_some(left**2)), usual))
     count = box(np.ones(len(left)), window)
-    return np.maximum(box(square - usual, window), SURE * box(usual, window)) / count
+    extra: Floats = np.maximum(box(square - usual, window), SURE * box(usual, window)) / count
+    return extra
 
 
 def _near(borders: np.ndarray, samples: int, reach: int) -> np.ndarray:

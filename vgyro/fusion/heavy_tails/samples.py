@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
 from vgyro.fusion.heavy_tails.robust_rate import (
@@ -118,13 +119,13 @@ def _look(array: ArrayRates, rows: slice) -> RateSamples:
     return RateSamples(values, used, run_starts(array.segment[rows])[1:])
 
 
-def _stuck(values: np.ndarray) -> np.ndarray:
+def _stuck(values: Floats) -> Bools:
     """[N, n]: samples in a window in which the gyro has hardly a step, while the others have."""
     steps = np.diff(values, axis=1, prepend=values[:, :1]) ** 2
     # One step far off is none of the others' motion.
     usual = np.median(steps, axis=1, keepdims=True)
     over = np.stack([box(one, STUCK_SAMPLES) for one in np.where(usual > 0, np.minimum(steps, FAR * usual), steps)])
-    small = over <= STUCK_SHARE * np.median(over, axis=0)
+    small: Bools = over <= STUCK_SHARE * np.median(over, axis=0)
     if not small.any():
         return small
     return np.stack([box(one.astype(float), STUCK_SAMPLES) > 0.5 for one in small])

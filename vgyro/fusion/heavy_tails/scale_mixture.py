@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 LOWEST, HIGHEST, PER_OCTAVE = -12, 52, 8
 """Bins of log2 x²: from 1/64 of the usual size to 6e7 times it, each 9 % wide; what lies beyond is in the last one."""
 BINS = (HIGHEST - LOWEST) * PER_OCTAVE
@@ -50,14 +52,15 @@ class ScaleMixture:
         """The standard normal density."""
         return cls.of(np.ones(1), np.ones(1))
 
-    def weight(self, square: np.ndarray) -> np.ndarray:
+    def weight(self, square: Floats) -> Floats:
         """-f'(x)/(x·f(x)) at squares x² of any shape: how much a sample so far off counts."""
         if len(self.sizes) == 1:
             return np.full(square.shape, self.pull[0])
         place = _place(square)
         below = place.astype(np.int32)
         step = np.diff(self.pull, append=self.pull[-1])
-        return self.pull[below] + (place - below) * step[below]
+        weight: Floats = self.pull[below] + (place - below) * step[below]
+        return weight
 
     def log_density(self, square: np.ndarray) -> np.ndarray:
         """log f(x) + ½·log 2π at squares x² [n]."""
@@ -112,7 +115,7 @@ def middles() -> np.ndarray:
     return np.exp2(LOWEST + (np.arange(BINS) + 0.5) / PER_OCTAVE)
 
 
-def _place(square: np.ndarray) -> np.ndarray:
+def _place(square: Floats) -> Floats:
     """Place of each square among the borders of the bins, 0 to just under BINS."""
     with np.errstate(divide="ignore"):
         place = (np.log2(square) - LOWEST) * PER_OCTAVE

@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from vgyro.fusion.motion.models import NARROW, UNLIMITED, Activity, Motion
+from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
 from vgyro.fusion.motion.search import FAMILIES
-from vgyro.fusion.motion.smoother import smooth, stretches
+from vgyro.fusion.motion.smoother import Smoothed, smooth, stretches
 
 BLOCK_S, LEAST_BLOCK = 0.25, 8
 """Length of the blocks, s, and samples of one at least."""
@@ -27,44 +28,36 @@ FAR = 6.0
 """A square counts no more, over the variance: one sample far off is no motion."""
 
 
-def find_activity(
-    z: np.ndarray,
-    r: float | np.ndarray,
-    segment: np.ndarray,
-    rate_hz: float,
-    motion: Motion,
-    phi: float = 0.0,
-    at_rest: np.ndarray | None = None,
-    rest: Motion | None = None,
-) -> Activity | None:
+def find_activity(noisy: NoisyRate, motion: Motion, standstill: Standstill | None = None) -> Activity | None:
     """Levels of the process noise, by samples; None: the model holds throughout, or has no noise to change.
 
-    All as in vgyro.fusion.motion.smoother.smooth. Samples at rest do not count. A sinusoid stays as it is.
+    All as in vgyro.fusion.motion.smoother.smooth. Samples of a standstill do not count. A sinusoid stays as it is.
     """
     sinusoid = motion.parameters.get("damping", 0.0) <= NARROW
     if motion.model == UNLIMITED or (motion.parameters.get("q") == 0.0 and sinusoid):
         return None
-    begins = _blocks(segment, max(LEAST_BLOCK, round(BLOCK_S * rate_hz)))
-    apart = np.isin(begins, [part.start for part in stretches(segment)])
-    counts = np.isfinite(np.broadcast_to(r, z.shape))
-    if at_rest is not None:
-        counts = counts & ~at_rest
+    samples = len(noisy.z)
+    begins = _blocks(noisy.segment, max(LEAST_BLOCK, round(BLOCK_S * noisy.rate_hz)))
+    apart = np.isin(begins, [part.start for part in stretches(noisy.segment)])
+    counts = np.isfinite(np.broadcast_to(noisy.r, noisy.z.shape))
+    if standstill is not None:
+        counts = counts & ~standstill.at_rest
 
     def errors(activity: Activity) -> np.ndarray:
-        found = smooth(z, r, segment, rate_hz, replace(motion, calibration=1.0), phi, "native", at_rest, rest, activity)
-        return _errors(z, r, phi, found.rate, found.variance, counts, begins)
+        found = smooth(noisy, replace(motion, calibration=1.0), "native", standstill, activity)
+        return _errors(noisy, found, counts, begins)
 
     cost = 2.0 * math.log(max(int(counts.sum()), 2))
     order = next(family.order for family in FAMILIES.values() if family.model == motion.model)
-    known = {level: errors(Activity.even(len(z), STEP**level, order)) for level in range(-FIRST, FIRST + 1)}
+    known = {level: errors(Activity.even(samples, STEP**level, order)) for level in range(-FIRST, FIRST + 1)}
     path = _path(known, cost, apart)
     while more := _beyond(known, path):
-        known |= {level: errors(Activity.even(len(z), STEP**level, order)) for level in more}
+        known |= {level: errors(Activity.even(samples, STEP**level, order)) for level in more}
         path = _path(known, cost, apart)
     levels, place = np.unique(path, return_inverse=True)
     if not levels.any():
         return None
-    lengths = np.diff(begins, append=len(z))
+    lengths = np.diff(begins, append=samples)
     activity = Activity(np.repeat(place.astype(np.uint8), lengths), STEP ** levels.astype(float), order)
     changes = int(np.count_nonzero(np.diff(path, prepend=0)))
     return activity if errors(activity).sum() + changes * cost < known[0].sum() else None
@@ -79,20 +72,12 @@ def _blocks(segment: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate(found)
 
 
-def _errors(
-    z: np.ndarray,
-    r: float | np.ndarray,
-    phi: float,
-    rate: np.ndarray,
-    variance: np.ndarray,
-    counts: np.ndarray,
-    begins: np.ndarray,
-) -> np.ndarray:
+def _errors(noisy: NoisyRate, found: Smoothed, counts: np.ndarray, begins: np.ndarray) -> np.ndarray:
     """Estimated squared error of the smoother in each block, in units of the noise, but for a constant."""
     with np.errstate(invalid="ignore"):
-        squares = np.minimum((z - rate) ** 2 / r, FAR) + 2.0 * variance / r
+        squares = np.minimum((noisy.z - found.rate) ** 2 / noisy.r, FAR) + 2.0 * found.variance / noisy.r
     squares[~counts] = 0.0
-    return np.add.reduceat(squares, begins) * (1.0 - phi) / (1.0 + phi)
+    return np.add.reduceat(squares, begins) * (1.0 - noisy.phi) / (1.0 + noisy.phi)
 
 
 def _beyond(known: dict[int, np.ndarray], path: np.ndarray) -> list[int]:

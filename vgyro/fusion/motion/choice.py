@@ -22,6 +22,7 @@ from vgyro.errors import DataError, EngineError
 from vgyro.fusion.motion.evidence import RateSpectrum, SpectrumPiece, gather, spectrum
 from vgyro.fusion.motion.lines import above_neighbours, fine_bands, peak, single, sinusoid, without_peaks
 from vgyro.fusion.motion.models import UNLIMITED, Motion, MotionCandidate, SpectralLine
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 from vgyro.fusion.motion.search import PRICE, MotionFit, crossing_of, line_price, refine, search, signal_of, still
 from vgyro.fusion.motion.start import wide_start
 
@@ -64,11 +65,7 @@ class ComparedModels:
 
 
 def choose_motion(
-    z: np.ndarray,
-    r: float | np.ndarray,
-    segment: np.ndarray,
-    rate_hz: float,
-    phi: float = 0.0,
+    noisy: NoisyRate,
     models: Sequence[str] = MOTION_MODELS,
     engine: str = "native",
     moving: np.ndarray | None = None,
@@ -77,7 +74,6 @@ def choose_motion(
 ) -> Motion:
     """The model of the rate whose smoother has the least estimated error.
 
-    z, r, segment, rate_hz, phi : as in vgyro.fusion.motion.smoother.smooth
     moving : [T] bool, only these samples count
     models : names of those to choose from;  lines : look for them
     shared : whether a line at a frequency, Hz, is motion; None: all are
@@ -85,7 +81,7 @@ def choose_motion(
     motion: sinusoids, or with a width. A model whose smoother breaks down is left out.
     raises : DataError if the samples do not change, or if r is not above zero; TooShort
     """
-    pieces = gather(z, r, segment, rate_hz, phi, moving)
+    pieces, rate_hz = gather(noisy, moving), noisy.rate_hz
     families = _families(models)
     found = (
         _best(pieces, rate_hz, families, shared)
@@ -96,10 +92,10 @@ def choose_motion(
         MotionCandidate(*_named(fit, found.sinusoids, models), fit.risk + found.spent, fit.cost + found.spent)
         for fit in found.fits
     )
-    z, r, free = np.asarray(z, dtype=float), np.asarray(r, dtype=float), float(found.bands.weight.sum())
+    free = float(found.bands.weight.sum())
     for row in rows:
         motion = Motion(row.model, row.parameters, rate_hz, rows, lines=row.lines)
-        if row.cost < free and _stands(motion, z, r, phi, found.pieces, engine):
+        if row.cost < free and _stands(motion, noisy, found.pieces, engine):
             return motion
     return Motion(UNLIMITED, {}, rate_hz, rows)
 
@@ -200,24 +196,16 @@ class AtRest:
     noise: float = 1.0
 
 
-def beside_fixed(
-    z: np.ndarray,
-    r: float | np.ndarray,
-    segment: np.ndarray,
-    rate_hz: float,
-    phi: float,
-    fixed: Motion,
-    shared: Callable[[float], bool] | None = None,
-) -> AtRest:
+def beside_fixed(noisy: NoisyRate, fixed: Motion, shared: Callable[[float], bool] | None = None) -> AtRest:
     """The motion that the smoother `fixed`, of a board at rest, would take away.
 
-    z, r, segment, rate_hz, phi, shared : as in choose_motion
+    shared : as in choose_motion
     raises : as choose_motion
     Noise at rest may have any colour: only what stands out of its neighbours is passed.
     """
     if fixed.model == UNLIMITED:
         return AtRest()
-    pieces = gather(z, r, segment, rate_hz, phi, None)
+    pieces, rate_hz = gather(noisy), noisy.rate_hz
     whole = spectrum(pieces, rate_hz)
     bare = MotionFit(fixed.model, fixed.parameters, (), np.empty(0), 0.0, 0.0)
     found = _lines(pieces, above_neighbours(whole), bare, shared)
@@ -263,15 +251,16 @@ def _spent(sinusoids: tuple[SpectralLine, ...], whole: RateSpectrum) -> float:
     return len(sinusoids) * (line_price(whole) - 2.0 * PRICE + SPENT * share)
 
 
-def _stands(motion: Motion, z: np.ndarray, r: np.ndarray, phi: float, pieces: list[SpectrumPiece], engine: str) -> bool:
+def _stands(motion: Motion, noisy: NoisyRate, pieces: list[SpectrumPiece], engine: str) -> bool:
     """The smoother itself does not break down on the longest piece, and its estimated risk is below no smoothing's."""
+    z, r = np.asarray(noisy.z, dtype=float), np.asarray(noisy.r, dtype=float)
     longest = max(pieces, key=lambda piece: len(piece.z))
     part = slice(longest.start, longest.start + min(len(longest.z), CHECKED))
     own, noise, model = z[part], r if r.ndim == 0 else r[part], motion.dynamics()
     start = wide_start(own, noise, model)
     if start is None:
         return False
-    space = StateSpace(model.transition, model.process, model.reads, model.reads, *start, pole=phi)
+    space = StateSpace(model.transition, model.process, model.reads, model.reads, *start, pole=noisy.phi)
     try:
         smoothed, variance = engines.get(engine).statespace.smooth(own, noise, space)
     except EngineError:

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from vgyro.errors import DataError, TooShort
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 
 LONGEST = 1 << 18
 """A stretch is cut into pieces of no more samples."""
@@ -114,11 +115,12 @@ def spectrum(pieces: list[SpectrumPiece], rate_hz: float) -> RateSpectrum:
     return RateSpectrum(frequency[order], power[order], noise[order], weight[order], rate_hz, len(pieces))
 
 
-def gather(
-    z: np.ndarray, r: float | np.ndarray, segment: np.ndarray, rate_hz: float, phi: float, moving: np.ndarray | None
-) -> list[SpectrumPiece]:
-    """The pieces of a recording on which models are compared.  raises : DataError, TooShort"""
-    z, r = np.asarray(z, dtype=float), np.asarray(r, dtype=float)
+def gather(noisy: NoisyRate, moving: np.ndarray | None = None) -> list[SpectrumPiece]:
+    """The pieces of a recording on which models are compared; moving [T] bool: of these samples alone.
+
+    raises : DataError, TooShort
+    """
+    z, r, segment = np.asarray(noisy.z, dtype=float), np.asarray(noisy.r, dtype=float), noisy.segment
     told = np.broadcast_to(np.isfinite(r), z.shape)
     if moving is not None:
         told = told & np.asarray(moving, dtype=bool)
@@ -139,7 +141,7 @@ def gather(
     spikes = _spikes(z, r)
     if np.count_nonzero(spikes & told) <= RARE * total:
         told = told & ~spikes
-    return [_piece(z, r, told, run, phi, rate_hz) for run in runs]
+    return [_piece(z, r, told, run, noisy.phi, noisy.rate_hz) for run in runs]
 
 
 def _spikes(z: np.ndarray, r: np.ndarray) -> np.ndarray:

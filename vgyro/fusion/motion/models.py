@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.errors import DataError
 
 UNLIMITED = "none"
@@ -304,7 +305,7 @@ class SteadyGain:
     r: float
     phi: float = 0.0
 
-    def at(self, frequency: np.ndarray) -> np.ndarray:
+    def at(self, frequency: Floats) -> Floats:
         """G [F] at frequencies [F] above 0, Hz."""
         model = self.motion.dynamics()
         turn = np.exp(2j * math.pi * np.asarray(frequency, dtype=float) / self.motion.rate_hz)
@@ -317,7 +318,8 @@ class SteadyGain:
         response = np.linalg.solve(system, np.broadcast_to(model.reads[moves][:, None], (len(turn), len(F), 1)))[..., 0]
         signal = np.einsum("fi,ij,fj->f", response, Q, response.conj()).real
         noise = self.r * (1.0 - self.phi**2) / np.abs(1.0 - self.phi / turn) ** 2
-        return signal / (signal + noise)
+        gain: Floats = signal / (signal + noise)
+        return gain
 
     def without_lines(self) -> SteadyGain:
         return replace(self, motion=replace(self.motion, lines=()))

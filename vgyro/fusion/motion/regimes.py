@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.errors import DataError
 from vgyro.fusion.motion.models import Activity, Dynamics, Motion
+from vgyro.fusion.motion.noisy_rate import Standstill
 
 JUMP = 5.0
 """Means on both sides that differ by so many standard deviations: a jump."""
@@ -44,16 +46,16 @@ class Regimes:
         self,
         motion: Motion,
         dynamics: Dynamics,
-        at_rest: np.ndarray,
-        rest: Motion,
+        standstill: Standstill,
         density: float,
         jumps: np.ndarray,
         free: float,
     ) -> Regimes:
-        """At rest [T] the rate is the random walk `rest`; to the samples `jumps` it may go anywhere.
+        """In a standstill the rate is the random walk of its motion; to the samples `jumps` it may go anywhere.
 
         density : of the noise, deg²/s;  free : variance of a step that may go anywhere, (deg/s)²
         """
+        at_rest, rest = standstill
         still, slowed = _at_rest(dynamics, motion, rest, density)
         freed = slowed.copy()
         freed[0, 0] += free
@@ -74,7 +76,7 @@ def jumps_at_ends(
 ) -> np.ndarray:
     """First samples [J] after those ends of standstill at which the rate jumps.
 
-    z, r, segment, phi, at_rest : as in vgyro.fusion.motion.smoother.smooth
+    z, r, segment, phi : as in NoisyRate;  at_rest [T] : the standstill
     size : samples on both sides that are compared
     """
     ends = np.flatnonzero((np.diff(at_rest.astype(np.int8)) != 0) & (np.diff(segment) == 0)) + 1
@@ -111,7 +113,7 @@ def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -
     return F, Q
 
 
-def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np.ndarray:
+def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> Floats:
     """Variances [n] of derivatives of the rate in the steady filter of white noise N², each times T^(2k).
 
     With w = (q/N²)^(1/2n) they are N²·√2·(w, w³) for n = 2, N²·(2w, 3w³, 2w⁵) for n = 3. An oscillation begins at zero;
@@ -128,4 +130,5 @@ def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> np
         factors = np.array([2.0, 3.0, 2.0]) if motion.model == "jerk" else np.full(2, math.sqrt(2.0))
     w = (q / density) ** (1.0 / (6.0 if motion.model == "jerk" else 4.0))
     order = dynamics.order
-    return density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)
+    known: Floats = density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)
+    return known

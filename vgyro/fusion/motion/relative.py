@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.noise.reference_rate import reference, smoothed, smoothing_window, used
 from vgyro.fusion.types import ArrayRates
 
@@ -200,7 +201,7 @@ def without_relative(array: ArrayRates) -> tuple[ArrayRates, Relative | None, st
     return replace(array, rate=rate), found, found.note
 
 
-def relative_variance(array: ArrayRates, found: Relative, weights: np.ndarray, delay_sd: float) -> np.ndarray:
+def relative_variance(array: ArrayRates, found: Relative, weights: Floats, delay_sd: float) -> Floats:
     """Variance [T], (deg/s)², of what the answers leave in Σu·y: of their errors, and of what all gyros share.
 
     weights : [N], Σ = 1;  delay_sd : of the delay that all share where it is known, s; NaN: as their spread has it
@@ -209,4 +210,5 @@ def relative_variance(array: ArrayRates, found: Relative, weights: np.ndarray, d
     if math.isfinite(delay_sd):
         common[1] = delay_sd**2
     sizes = common + np.einsum("i,kij,j->k", weights, found.covariance, weights)
-    return np.square(terms) @ sizes
+    variance: Floats = np.square(terms) @ sizes
+    return variance

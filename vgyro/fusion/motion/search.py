@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.motion import density, models
 from vgyro.fusion.motion.density import LINE, PAIR, MotionFamily, of_line, pair_power
 from vgyro.fusion.motion.evidence import RateSpectrum
@@ -206,9 +207,10 @@ def _product(*sides: np.ndarray | tuple[float, ...]) -> np.ndarray:
 def _driven_grid(order: int) -> Callable[[RateSpectrum, float], np.ndarray]:
     """The frequency at which rate and noise have the same density, q = N²·(2π·f)^(2·order)."""
 
-    def grid(spectrum: RateSpectrum, crossing: float) -> np.ndarray:  # noqa: ARG001
+    def grid(spectrum: RateSpectrum, crossing: float) -> Floats:  # noqa: ARG001
         places = np.geomspace(0.03 * spectrum.frequency[0], spectrum.rate_hz, 30)
-        return (spectrum.noise[0] * (2.0 * math.pi * places) ** (2 * order))[:, None]
+        densities: Floats = (spectrum.noise[0] * (2.0 * math.pi * places) ** (2 * order))[:, None]
+        return densities
 
     return grid
 

@@ -22,7 +22,7 @@ BESIDE = (6, 7, 8, 9, 10, 11)
 def shared_lines(rate: np.ndarray, segment: np.ndarray, rate_hz: float) -> Callable[[float], bool]:
     """Whether the gyros share a line at a frequency, Hz.
 
-    rate : [T, N], deg/s;  segment : as in vgyro.fusion.motion.smoother.smooth
+    rate : [T, N], deg/s;  segment : as in vgyro.fusion.motion.noisy_rate.NoisyRate
     With amplitudes A_i ± σ_i in the longest stretch: a motion leaves Σ |A_i - A|²/(σ_i² + (ALIKE·A)²), noise of gyro j
     the sum of |A_i|²/σ_i² over the others. The smaller one decides, and a single gyro tells nothing: yes.
     """

@@ -18,6 +18,7 @@ from vgyro.engine.linear import StateSpace
 from vgyro.errors import DataError
 from vgyro.fusion.motion.choice import choose_motion
 from vgyro.fusion.motion.models import UNLIMITED, Activity, Motion, SteadyGain, fixed_bandwidth
+from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
 from vgyro.fusion.motion.regimes import Regimes, jumps_at_ends
 from vgyro.fusion.motion.start import wide_start
 from vgyro.runs import runs
@@ -53,43 +54,39 @@ class Smoothed:
 
 
 def smooth(
-    z: np.ndarray,
-    r: float | np.ndarray,
-    segment: np.ndarray,
-    rate_hz: float,
+    noisy: NoisyRate,
     motion: Motion,
-    phi: float = 0.0,
     engine: str = "native",
-    at_rest: np.ndarray | None = None,
-    rest: Motion | None = None,
+    standstill: Standstill | None = None,
     activity: Activity | None = None,
 ) -> Smoothed:
     """The rate given all samples of each gap-free stretch.
 
-    z       : [T] deg/s;  r : variance of its noise, (deg/s)², one or [T]; infinite: z says nothing at this sample
-    segment : [T], number of the gap-free stretch;  rate_hz : sample rate, Hz
-    motion  : how the rate moves;  phi : AR(1) coefficient of the noise, from one sample to the next, 0 ≤ phi < 1
-    at_rest, rest : samples [T] over which the rate is the random walk `rest` instead; what the motion has beside a rate
-              (derivative, oscillation) is at zero after them. Where it jumps at their ends, it is free to
+    motion   : how the rate moves
+    standstill : samples over which the rate is a random walk instead; what the motion has beside a rate (derivative,
+               oscillation) is at zero after them. Where it jumps at their ends, it is free to
     activity : how lively the rate is at each sample; None: as its model says. Its levels have no calibration
-    raises  : EngineError for samples that cannot be used, DataError for parameters that do not fit
+    raises   : EngineError for samples that cannot be used, DataError for parameters that do not fit
     A stretch without any sample that says something is NaN, with infinite variance.
     """
-    z, r = np.asarray(z, dtype=float), np.asarray(r, dtype=float)
+    z, r = np.asarray(noisy.z, dtype=float), np.asarray(noisy.r, dtype=float)
+    segment, rate_hz, phi = noisy.segment, noisy.rate_hz, noisy.phi
     _check(z, r, segment, rate_hz, motion, phi)
     mean = mean_variance(r)
     steady = SteadyGain(motion, mean, phi)
-    standing = at_rest is not None and rest is not None and bool(np.any(at_rest))
-    if motion.model == UNLIMITED and not standing:
+    if standstill is not None and not np.any(standstill.at_rest):
+        standstill = None
+    if motion.model == UNLIMITED and standstill is None:
         variance = np.broadcast_to(r, z.shape).copy()
         return Smoothed(z.copy(), variance, motion, math.nan, math.nan, 0, motion.text)
     rate, variance = np.empty(len(z)), np.empty(len(z))
     dynamics = _free(motion, mean).dynamics()
     regimes = Regimes.of(motion, dynamics, len(z), activity)
-    if standing and rest is not None and at_rest is not None:
-        jumps = jumps_at_ends(z, r, segment, phi, at_rest, max(1, round(JUMP_S * rate_hz)))
+    if standstill is not None:
+        jumps = jumps_at_ends(z, r, segment, phi, standstill.at_rest, max(1, round(JUMP_S * rate_hz)))
         density = mean / rate_hz * (1.0 + phi) / (1.0 - phi)
-        regimes = regimes.with_rest(motion, dynamics, at_rest, _free(rest, mean), density, jumps, FREE * mean)
+        rest = Standstill(standstill.at_rest, _free(standstill.motion, mean))
+        regimes = regimes.with_rest(motion, dynamics, rest, density, jumps, FREE * mean)
     run = engines.get(engine).statespace.smooth
     for part in stretches(segment):
         own = r if r.ndim == 0 else r[part]
@@ -103,10 +100,10 @@ def smooth(
     if not np.all(variance > 0.0):
         broken = int(np.argmin(variance > 0.0))
         raise DataError(f"the smoother breaks down: {motion.text}", f"sample {broken}", "choose another motion model")
-    plain = activity is None and not phi and not standing
+    plain = activity is None and not phi and standstill is None
     low_pass = motion.model == "random_walk" and not motion.lines and plain and (r.ndim == 0 or bool(np.all(r == r[0])))
     text = motion.text + (f"; {activity.text}" if activity is not None else "")
-    text += f"; at rest {rest.text}" if standing and rest is not None else ""
+    text += f"; at rest {standstill.motion.text}" if standstill is not None else ""
     if phi:
         text += f"; noise AR(1), {phi:.3g} a sample"
     limits = (math.nan, math.nan) if motion.model == UNLIMITED else (steady.bandwidth_hz(), steady.noise_bandwidth_hz())

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.noise.cornered_hat import pair_variances, patterns
 from vgyro.fusion.noise.difference_blocks import BlockMoments
 from vgyro.fusion.types import ArrayRates
@@ -56,12 +57,13 @@ def _ratio(variance: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     return np.where(variance > 0, covariance / np.where(variance > 0, variance, 1.0), 0.0)
 
 
-def _weights(variance: np.ndarray) -> np.ndarray:
+def _weights(variance: Floats) -> Floats:
     """Weights [N] of the first-pass rate, ∝ 1/variance, none above a half: a gyro's residual must show the gyro."""
     weights = 1.0 / variance / np.sum(1.0 / variance)
     small = weights < MOST_WEIGHT
     kept = np.minimum(weights, MOST_WEIGHT)
-    return kept + (1.0 - kept.sum()) * small / max(int(small.sum()), 1)
+    limited: Floats = kept + (1.0 - kept.sum()) * small / max(int(small.sum()), 1)
+    return limited
 
 
 def _shares(square: np.ndarray, weights: np.ndarray) -> np.ndarray:

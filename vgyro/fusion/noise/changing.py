@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.noise.cornered_hat import LEAST_SHARE, BestWeights, best_weights, outliers
 from vgyro.fusion.noise.difference_blocks import BlockMoments
 from vgyro.fusion.noise.variance_model import Memory, chosen_memory
@@ -88,7 +89,7 @@ def _settled(
     return square
 
 
-def _squares(moments: BlockMoments, variance: np.ndarray, used: np.ndarray, correlation: np.ndarray) -> np.ndarray:
+def _squares(moments: BlockMoments, variance: Floats, used: Bools, correlation: Floats) -> Floats:
     """Mean squares [M, N] of the gyros' noise, (deg/s)², without bias where `variance` [M, N] is theirs.
 
     Residual against the best estimate, less its slow part; what these two took of it is added (see parity_hat).
@@ -96,7 +97,8 @@ def _squares(moments: BlockMoments, variance: np.ndarray, used: np.ndarray, corr
     best = best_weights(variance, moments.excluded, correlation)
     square, mean = moments.residual(best.weights)
     slow, lost = _slow_part(moments, best, variance, used, mean)
-    return np.maximum(square - 2.0 * mean * slow + slow**2, 0.0) + best.variance[:, None] + lost
+    squares: Floats = np.maximum(square - 2.0 * mean * slow + slow**2, 0.0) + best.variance[:, None] + lost
+    return squares
 
 
 def _slow_part(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.noise.cornered_hat import LEAST_SHARE, outliers
 from vgyro.fusion.noise.difference_blocks import BlockMoments
 from vgyro.fusion.noise.variance_model import (
@@ -93,7 +94,7 @@ def resting_noise(
     return Resting(variance, memories, correlation, moving)
 
 
-def _less_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
+def _less_slow(moments: BlockMoments, used: Bools) -> Floats:
     """Second moments [M, N, N] a sample, (deg/s)², of the rates less their slow part, without bias for white noise.
 
     The slow part is the mean over the blocks about each that are `used` [M, N].
@@ -149,9 +150,7 @@ def _moving(
     return _regular(_average(standard, freedom, math.exp(-block_s / best), low_pass, slice(None), alone=False))
 
 
-def _average(
-    standard: np.ndarray, freedom: np.ndarray, keep: float, low_pass: LowPass, rows: slice, alone: bool
-) -> np.ndarray:
+def _average(standard: Floats, freedom: Floats, keep: float, low_pass: LowPass, rows: slice, alone: bool) -> Floats:
     """Two-sided EWMA of the second moments, as correlations, of the blocks `rows`; alone: without the block itself."""
     gyros = standard.shape[1]
     result = np.empty(standard[rows].shape)
@@ -161,7 +160,8 @@ def _average(
             around = both_sides(total, keep, low_pass)
             result[:, one, other] = result[:, other, one] = (around - total if alone else around)[rows]
     sigma = np.sqrt(np.maximum(np.einsum("bii->bi", result), np.finfo(float).tiny))
-    return result / (sigma[:, :, None] * sigma[:, None, :])
+    average: Floats = result / (sigma[:, :, None] * sigma[:, None, :])
+    return average
 
 
 def _regular(correlation: np.ndarray) -> np.ndarray:

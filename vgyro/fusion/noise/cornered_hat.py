@@ -11,9 +11,11 @@ A common term of all gyros, R + c·11', is in no difference: only the part of C 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.noise.difference_blocks import BlockMoments
 
 ROUNDS = 200
@@ -50,10 +52,11 @@ def cornered_hat(pairs: np.ndarray) -> np.ndarray:
     return scale * np.asarray(nnls(design, pairs[first, second] / scale)[0])
 
 
-def pair_variances(square: np.ndarray) -> np.ndarray:
+def pair_variances(square: Floats) -> Floats:
     """Mean squares [..., N, N] of the differences y_i - y_j from second moments `square` [..., N, N] of y."""
     own = np.einsum("...ii->...i", square)
-    return own[..., :, None] + own[..., None, :] - 2.0 * square
+    variances: Floats = own[..., :, None] + own[..., None, :] - 2.0 * square
+    return variances
 
 
 @dataclass(frozen=True)
@@ -91,8 +94,15 @@ def patterns(excluded: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(np.zeros_like(pattern) if pattern.all() else pattern, rows) for pattern, rows in found]
 
 
-def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variances [N] a sample, (deg/s)², that hold for the whole recording, and the outlying blocks [M, N].
+class ConstantVariances(NamedTuple):
+    """Variances [N] a sample, (deg/s)², that hold for the whole recording, and the outlying blocks [M, N]."""
+
+    variance: np.ndarray
+    outlier: np.ndarray
+
+
+def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> ConstantVariances:
+    """The gyros' variances if they do not change.
 
     The slow part (drift, bias) is left out, and so are the blocks that are excluded, or where one gyro is an outlier.
     """
@@ -105,10 +115,10 @@ def constant_variances(moments: BlockMoments, correlation: np.ndarray) -> tuple[
         if not outlier.any():
             break
         variance = _solve(moments, np.logical_not(outlier.any(axis=1)), correlation)
-    return variance, outlier
+    return ConstantVariances(variance, outlier)
 
 
-def outliers(square: np.ndarray) -> np.ndarray:
+def outliers(square: Floats) -> Bools:
     """Which blocks are far above their neighbours on both sides and above the mean of all: [M, N] of bool.
 
     square : [M, N], (deg/s)², mean square of each gyro in each block; zero where it is not known
@@ -118,10 +128,11 @@ def outliers(square: np.ndarray) -> np.ndarray:
         around[shift:] = np.maximum(around[shift:], square[:-shift])
         around[:-shift] = np.maximum(around[:-shift], square[shift:])
     mean = square.sum(axis=0) / np.maximum((square > 0).sum(axis=0), 1)
-    return (around > 0) & (square > FAR * around) & (square > FAR_FROM_MEAN * mean)
+    far: Bools = (around > 0) & (square > FAR * around) & (square > FAR_FROM_MEAN * mean)
+    return far
 
 
-def _without_slow(moments: BlockMoments, used: np.ndarray) -> np.ndarray:
+def _without_slow(moments: BlockMoments, used: Bools) -> Floats:
     """Second moments [M, N, N] a sample of the differences less their slow part, without bias for constant variances.
 
     used [M] : the blocks that the slow part is the mean of

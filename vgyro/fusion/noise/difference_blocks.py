@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.blocks import PIECE
 from vgyro.fusion.events import excluded
 from vgyro.fusion.samples.missing import away
@@ -53,18 +55,20 @@ class BlockMoments:
     excluded: np.ndarray
 
     @property
-    def size(self) -> np.ndarray:
+    def size(self) -> Ints:
         """Samples of each block [M]."""
-        return self.stop - self.start
+        size: Ints = self.stop - self.start
+        return size
 
     def part(self, blocks: np.ndarray) -> BlockMoments:
         """Some of the blocks, by number; their windows are still those of all."""
         return BlockMoments(*(getattr(self, one.name)[blocks] for one in fields(self)))
 
-    def window_sum(self, values: np.ndarray) -> np.ndarray:
+    def window_sum(self, values: Floats | Ints) -> Floats:
         """Sums of values [M, ...] over the window about each block."""
         total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
-        return total[self.high + 1] - total[self.low]
+        sums: Floats = total[self.high + 1] - total[self.low]
+        return sums
 
     def residual(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean squares, (deg/s)², and means, deg/s, [M, N] of y - 1·u'y in each block, for u [M, N] with Σu = 1."""
@@ -80,7 +84,8 @@ def block_moments(array: ArrayRates, size: int | None = None, own: bool = False)
 
     own : of the rates themselves, each less its mean over the recording, in place of the differences
     """
-    start, stop, low, high = _edges(array, block_size(array.rate_hz) if size is None else size)
+    edges = _edges(array, block_size(array.rate_hz) if size is None else size)
+    start, stop = edges.start, edges.stop
     gyros = array.rate.shape[1]
     level = np.array([column.mean(dtype=float) for column in array.rate.T])[:, None] if own else None
     square = np.empty((len(start), gyros, gyros))
@@ -100,7 +105,7 @@ def block_moments(array: ArrayRates, size: int | None = None, own: bool = False)
     _mark(bad, start, stop, excluded(array.faults, len(array.rate), gyros))
     if array.missing is not None:
         _mark(bad, start, stop, [away(column, block_size(array.rate_hz)) for column in array.missing.T])
-    return BlockMoments(start, stop, low, high, square, mean, bad)
+    return BlockMoments(*edges, square, mean, bad)
 
 
 def block_size(rate_hz: float) -> int:
@@ -108,8 +113,17 @@ def block_size(rate_hz: float) -> int:
     return 1 if rate_hz < SINGLE_BELOW_HZ else max(FEWEST_SAMPLES, round(BLOCK_S * rate_hz))
 
 
-def _edges(array: ArrayRates, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """start, stop, low, high of the blocks; what is left over in a stretch is of its last block."""
+class _Edges(NamedTuple):
+    """As in BlockMoments."""
+
+    start: np.ndarray
+    stop: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def _edges(array: ArrayRates, size: int) -> _Edges:
+    """Edges of the blocks; what is left over in a stretch is of its last block."""
     starts, stops, lows, highs, number = [], [], [], [], 0
     for part in array.stretches():
         count = max(1, (part.stop - part.start) // size)
@@ -120,8 +134,7 @@ def _edges(array: ArrayRates, size: int) -> tuple[np.ndarray, np.ndarray, np.nda
         lows.append(np.maximum(place - SLOW_BLOCKS, number))
         highs.append(np.minimum(place + SLOW_BLOCKS, number + count - 1))
         number += count
-    start, stop, low, high = (np.concatenate(one) for one in (starts, stops, lows, highs))
-    return start, stop, low, high
+    return _Edges(*(np.concatenate(one) for one in (starts, stops, lows, highs)))
 
 
 def _pieces(start: np.ndarray, stop: np.ndarray) -> Iterator[slice]:

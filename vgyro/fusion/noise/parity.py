@@ -13,12 +13,19 @@ from functools import partial
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.blocks import PIECE, SampleWeights
 from vgyro.fusion.noise.ar1 import colour
 from vgyro.fusion.noise.changing import changing_variances
 from vgyro.fusion.noise.changing_at_rest import Resting, resting_noise
 from vgyro.fusion.noise.changing_in_motion import alike, compared, moving_noise
-from vgyro.fusion.noise.cornered_hat import best_weights, constant_variances, patterns, scaled_to_pairs
+from vgyro.fusion.noise.cornered_hat import (
+    ConstantVariances,
+    best_weights,
+    constant_variances,
+    patterns,
+    scaled_to_pairs,
+)
 from vgyro.fusion.noise.cornered_hat import cornered_hat as cornered_hat
 from vgyro.fusion.noise.cornered_hat import pair_variances as pair_variances
 from vgyro.fusion.noise.difference_blocks import BlockMoments, block_moments
@@ -68,12 +75,14 @@ class Variances:
     @property
     def gyros(self) -> int:
         """N."""
-        return self.variance.shape[1]
+        gyros: int = self.variance.shape[1]
+        return gyros
 
     @property
-    def shares(self) -> np.ndarray:
+    def shares(self) -> Ints:
         """Samples of each block [M]."""
-        return self.stop - self.start
+        shares: Ints = self.stop - self.start
+        return shares
 
     def weights(self, engine: str = "native") -> np.ndarray:
         """Minimum-variance weights [M, N] of R_t = σσ'∘C: Σ = 1, 0 where excluded; equal if all are.
@@ -135,26 +144,30 @@ class Variances:
         """The weights of the samples."""
         return SampleWeights.of(self.weights(engine), self.block_of_sample())
 
-    def combined_variance(self, weights: np.ndarray | None = None) -> np.ndarray:
+    def combined_variance(self, weights: Floats | None = None) -> Floats:
         """u'Ru [M], (deg/s)², of one sample of the combination; weights u [M, N], None: those of least variance."""
         weights = self.weights() if weights is None else weights
         if self.added is not None:
             own = weights * np.sqrt(np.maximum(self.variance - self.added[:, None], 0.0))
-            return np.sum((own @ self.correlation) * own, axis=1) + self.added * np.sum(weights**2, axis=-1)
+            variance: Floats = np.sum((own @ self.correlation) * own, axis=1) + self.added * np.sum(weights**2, axis=-1)
+            return variance
         parts = weights * np.sqrt(self.variance)
         if self.moving is not None:
-            return np.einsum("bi,bij,bj->b", parts, self.moving, parts)
-        return np.sum((parts @ self.correlation) * parts, axis=1)
+            variance = np.einsum("bi,bij,bj->b", parts, self.moving, parts)
+            return variance
+        variance = np.sum((parts @ self.correlation) * parts, axis=1)
+        return variance
 
     def colour(self, weights: np.ndarray | None = None) -> float:
         """φ of the combination: mean of the gyros', by their shares u_i²σ_i² of its variance."""
         return float(self._parts(weights) @ self.phi)
 
-    def _parts(self, weights: np.ndarray | None) -> np.ndarray:
+    def _parts(self, weights: Floats | None) -> Floats:
         """Shares [N] of the gyros in the variance of the combination, of Σ = 1, correlations left out."""
         parts = (self.weights() if weights is None else weights) ** 2 * self.variance
         share = (parts / parts.sum(axis=1, keepdims=True) * self.shares[:, None]).sum(axis=0)
-        return share / share.sum()
+        shares: Floats = share / share.sum()
+        return shares
 
 
 def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: bool = True) -> Variances:
@@ -191,7 +204,7 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
     memories = [CONSTANT] * gyros
     moving, changing = None, changing and parameters.has("changing")
     if changing:
-        found = _changing(array, moments, constant, outlier, correlation, parameters, motion is None)
+        found = _changing(array, moments, ConstantVariances(constant, outlier), correlation, parameters, motion is None)
         variance, memories, correlation, moving = found.variance, found.memories, found.correlation, found.moving
     tau = np.array([memory.tau_s for memory in memories])
     if motion is not None:
@@ -209,10 +222,15 @@ def parity_variances(array: ArrayRates, parameters: FilterParameters, changing: 
 
 
 def _changing(
-    array: ArrayRates, moments: BlockMoments, constant: np.ndarray, outlier: np.ndarray, correlation: np.ndarray,
-    parameters: FilterParameters, together: bool = True,
-) -> Resting:  # fmt: skip
+    array: ArrayRates,
+    moments: BlockMoments,
+    known: ConstantVariances,
+    correlation: np.ndarray,
+    parameters: FilterParameters,
+    together: bool = True,
+) -> Resting:
     """Variances that change, and the correlation, if that changes as well and may."""
+    constant, outlier = known
     engine, together = parameters.engine, together and parameters.has("changing_correlation")
     block_s = float(np.median(moments.size)) / array.rate_hz
     if array.at_rest.all():

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats, Ints
 from vgyro.engine.cross_spectra import CrossSpectra, cross_spectra, window_length, window_starts
 from vgyro.fusion.noise.difference_blocks import BlockMoments
 from vgyro.fusion.types import ArrayRates
@@ -104,12 +105,13 @@ def _together(good: np.ndarray) -> np.ndarray:
     return both if usual.sum() > 1 and both.any(axis=1).mean() > MOSTLY else good
 
 
-def good_blocks(moments: BlockMoments, starts: np.ndarray, length: int) -> np.ndarray:
+def good_blocks(moments: BlockMoments, starts: Ints, length: int) -> Bools:
     """[W, N]: no block of the window is excluded."""
     bad = np.concatenate([np.zeros((1, moments.excluded.shape[1])), np.cumsum(moments.excluded, axis=0)])
     first = np.searchsorted(moments.stop, starts, side="right")
     last = np.searchsorted(moments.start, starts + length, side="left")
-    return np.equal(bad[last], bad[first])
+    good: Bools = np.equal(bad[last], bad[first])
+    return good
 
 
 def _weighed(found: CrossSpectra, weights: np.ndarray) -> Quiet | None:
@@ -149,7 +151,7 @@ def _weighed(found: CrossSpectra, weights: np.ndarray) -> Quiet | None:
     return Quiet(pairs, variance, samples, mean - floor, flat)
 
 
-def _smoothed(values: np.ndarray) -> np.ndarray:
+def _smoothed(values: Floats) -> Floats:
     """Means [G, F] over SMOOTHED neighbours."""
     side = SMOOTHED // 2
     padded = np.pad(values, ((0, 0), (side, side)), mode="edge")

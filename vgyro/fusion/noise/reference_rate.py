@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.events import excluded
 from vgyro.fusion.noise.quiet_frequencies import quiet_noise
 from vgyro.fusion.types import ArrayRates
@@ -54,7 +55,7 @@ def _shares(array: ArrayRates, good: np.ndarray) -> tuple[np.ndarray, float]:
 
     Where these say nothing, of the steps between neighbouring samples, as if no gyro's noise were another's.
     """
-    shares = 1.0 / _white(array, good)
+    shares: Floats = 1.0 / _white(array, good)
     noise, shares = 1.0 / float(shares.sum()), shares / shares.sum()
     lost = np.concatenate([np.zeros((1, good.shape[1]), dtype=np.int64), np.cumsum(~good, axis=0)])
     quiet = quiet_noise(array, shares, lambda starts, length: np.equal(lost[starts + length], lost[starts]))
@@ -67,7 +68,7 @@ def _shares(array: ArrayRates, good: np.ndarray) -> tuple[np.ndarray, float]:
     return shares, float(shares @ covariance @ shares)
 
 
-def _white(array: ArrayRates, good: np.ndarray) -> np.ndarray:
+def _white(array: ArrayRates, good: Bools) -> Floats:
     """Variances of the gyros' white noise [N], from the steps of neighbouring samples about the mean of all.
 
     a_i = σ_i²·(1 - 2/N) + Σσ²/N². None below LEAST of the median; two gyros have the same.
@@ -87,7 +88,8 @@ def _white(array: ArrayRates, good: np.ndarray) -> np.ndarray:
     if gyros == 2 or total == 0.0:
         return np.full(gyros, total / gyros or 1.0)
     found = (seen - total / gyros**2) / (1.0 - 2.0 / gyros)
-    return np.maximum(found, LEAST * max(float(np.median(found)), total * 1e-6))
+    white: Floats = np.maximum(found, LEAST * max(float(np.median(found)), total * 1e-6))
+    return white
 
 
 def smoothing_window(array: ArrayRates, mean: np.ndarray, noise: float) -> int | None:

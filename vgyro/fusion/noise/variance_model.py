@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 TIME_CONSTANTS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0)
 FEWEST_BLOCKS = 2.0
 """A shorter time constant, in blocks, is no average."""
@@ -45,7 +47,7 @@ class Memory:
 CONSTANT = Memory(1.0, math.inf)
 
 
-def both_sides(values: np.ndarray, keep: float, low_pass: LowPass) -> np.ndarray:
+def both_sides(values: Floats, keep: float, low_pass: LowPass) -> Floats:
     """Σ_c keep^|b - c|·values_c [M] of values [M]."""
     ahead = low_pass(np.ascontiguousarray(values[::-1]), keep, 1.0, 0.0)[::-1]
     return low_pass(values, keep, 1.0, 0.0) + ahead - values

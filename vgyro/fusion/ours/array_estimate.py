@@ -13,11 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.estimate import SlowErrors, combined_without, slow_errors
 from vgyro.fusion.blocks import SampleWeights
 from vgyro.fusion.motion.lowpass import ArrayDelay, array_delay
 from vgyro.fusion.motion.models import Motion
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 from vgyro.fusion.motion.relative import Relative, relative_variance
 from vgyro.fusion.motion.shared import shared_lines
 from vgyro.fusion.motion.smoother import choose_motion
@@ -76,9 +78,9 @@ class Analysed:
         shares = self.variances.shares @ weights / len(self.array.rate)
         return relative_variance(self.array, self.relative, shares, self.late_sd)
 
-    def at_samples(self, variance: np.ndarray) -> np.ndarray:
+    def at_samples(self, variance: Floats) -> Floats:
         """Variances [M] of the blocks at the samples [T]; infinite where no gyro says anything."""
-        found = variance[self.variances.block_of_sample()]
+        found: Floats = variance[self.variances.block_of_sample()]
         lost = unseen(self.array)
         if lost is not None:
             found[lost] = np.inf
@@ -93,6 +95,11 @@ class Analysed:
         usual = shares @ shared_variances(self.array, parameters, True).variance
         least = lasting_of_mean(known, usual, self.slow.bias.mean(axis=0), shares @ weights)
         return np.where(self.array.at_rest, np.maximum(variance, least), variance)
+
+    def noisy_rate(self) -> NoisyRate:
+        """The best fused rate, with its variance."""
+        array = self.array
+        return NoisyRate(self.rate(), self.variance(), array.segment, array.rate_hz, self.variances.colour())
 
     def bridged(self, rate: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A rate and its variance [T] as a smoother takes them: with what is likely where no gyro says anything."""
@@ -113,11 +120,10 @@ def shared_motion(array: ArrayRates, parameters: FilterParameters) -> Motion:
         lost = unseen(known.array)
         if lost is not None:
             moving = ~lost if moving is None else moving & ~lost
+        shared = shared_lines(known.array.rate, array.segment, array.rate_hz)
         return choose_motion(
-            known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(),
-            parameters.motion_models, parameters.engine, moving,
-            shared_lines(known.array.rate, array.segment, array.rate_hz), parameters.has("lines"),
-        )  # fmt: skip
+            known.noisy_rate(), parameters.motion_models, parameters.engine, moving, shared, parameters.has("lines")
+        )
 
     return array.once(("motion", parameters), choose)
 

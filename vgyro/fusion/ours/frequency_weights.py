@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion import design
 from vgyro.fusion.bias.estimate import combined_without, slow_errors
 from vgyro.fusion.types import ArrayRates, FilterParameters, Fused, cannot_run
@@ -27,7 +28,7 @@ def frequency_weights(array: ArrayRates, parameters: FilterParameters) -> Fused:
     return Fused.undelayed(combined_without(array, u, slow), u, note)
 
 
-def weights_at(frequency: np.ndarray, arw: np.ndarray, rrw: np.ndarray, correlation: np.ndarray) -> np.ndarray:
+def weights_at(frequency: Floats, arw: Floats, rrw: Floats, correlation: Floats) -> Floats:
     """Weights S⁻¹1/(1'S⁻¹1) [F, N] of the least variance at each frequency.
 
     frequency   : [F] Hz, above 0
@@ -37,4 +38,5 @@ def weights_at(frequency: np.ndarray, arw: np.ndarray, rrw: np.ndarray, correlat
     scale = (2.0 * math.pi * np.asarray(frequency, dtype=float)) ** -2
     density = np.outer(arw, arw) * correlation + scale[:, None, None] * np.outer(rrw, rrw) * correlation
     solved = np.linalg.solve(density, np.ones((len(density), len(arw), 1)))[..., 0]
-    return solved / solved.sum(axis=1)[:, None]
+    weights: Floats = solved / solved.sum(axis=1)[:, None]
+    return weights

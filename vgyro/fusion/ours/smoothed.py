@@ -19,6 +19,7 @@ from vgyro.fusion.blocks import SampleWeights, combined
 from vgyro.fusion.motion.activity import find_activity
 from vgyro.fusion.motion.choice import AtRest, beside_fixed
 from vgyro.fusion.motion.models import Activity, Motion
+from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
 from vgyro.fusion.motion.shared import shared_lines
 from vgyro.fusion.motion.smoother import Smoothed, fixed_bandwidth, mean_variance, smooth
 from vgyro.fusion.noise.parity import Variances, shared_variances
@@ -175,10 +176,8 @@ def without_pole(array: ArrayRates, rate: np.ndarray, time_s: float) -> np.ndarr
 def _in_motion(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> Smoothed:
     motion, activity = shared_motion(array, parameters), shared_activity(array, parameters)
     level = _level(array, signal.rate, signal.variance, motion)
-    found = smooth(
-        signal.rate - level, signal.variance, array.segment, array.rate_hz, motion, signal.colour, parameters.engine,
-        *_standstill(array, parameters, signal.variance), activity,
-    )  # fmt: skip
+    noisy = NoisyRate(signal.rate - level, signal.variance, array.segment, array.rate_hz, signal.colour)
+    found = smooth(noisy, motion, parameters.engine, _standstill(array, parameters, signal.variance), activity)
     return replace(found, rate=found.rate + level)
 
 
@@ -203,21 +202,18 @@ def shared_activity(array: ArrayRates, parameters: FilterParameters) -> Activity
         known, motion = analysed(array, parameters), shared_motion(array, parameters)
         rate, variance = known.bridged(known.rate(), known.variance())
         rate = rate - _level(array, rate, variance, motion)
-        return find_activity(
-            rate, variance, array.segment, array.rate_hz, motion, known.variances.colour(),
-            *_standstill(array, parameters, variance),
-        )  # fmt: skip
+        noisy = NoisyRate(rate, variance, array.segment, array.rate_hz, known.variances.colour())
+        return find_activity(noisy, motion, _standstill(array, parameters, variance))
 
     return array.once(("activity", parameters), find)
 
 
-def _standstill(
-    array: ArrayRates, parameters: FilterParameters, variance: float | np.ndarray
-) -> tuple[np.ndarray | None, Motion | None]:
+def _standstill(array: ArrayRates, parameters: FilterParameters, variance: float | np.ndarray) -> Standstill | None:
     """Where the board stands still in a recording in motion, and how the rate moves there; None: nowhere."""
     if not array.at_rest.any():
-        return None, None
-    return array.at_rest, fixed_bandwidth(parameters.bandwidth_hz, mean_variance(np.asarray(variance)), array.rate_hz)
+        return None
+    mean = mean_variance(np.asarray(variance))
+    return Standstill(array.at_rest, fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz))
 
 
 def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) -> tuple[Smoothed, np.ndarray]:
@@ -227,7 +223,7 @@ def _at_rest(array: ArrayRates, parameters: FilterParameters, signal: Signal) ->
     variance = np.asarray(signal.variance) * besides.noise
     mean = mean_variance(variance)
     motion = replace(fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz), lines=besides.lines)
-    result = smooth(signal.rate, mean, array.segment, array.rate_hz, motion, 0.0, parameters.engine)
+    result = smooth(NoisyRate(signal.rate, mean, array.segment, array.rate_hz), motion, parameters.engine)
     # Where no gyro says anything the rate at rest is that of the samples about it.
     told = np.where(np.isfinite(variance), variance, mean)
     share = np.broadcast_to(told / mean, array.segment.shape)
@@ -247,10 +243,7 @@ def shared_vibration(array: ArrayRates, parameters: FilterParameters) -> AtRest:
         known = analysed(array, parameters)
         mean = mean_variance(known.variance())
         fixed = fixed_bandwidth(parameters.bandwidth_hz, mean, array.rate_hz)
-        return beside_fixed(
-            known.rate(), known.variance(), array.segment, array.rate_hz, known.variances.colour(), fixed,
-            shared_lines(known.array.rate, array.segment, array.rate_hz),
-        )  # fmt: skip
+        return beside_fixed(known.noisy_rate(), fixed, shared_lines(known.array.rate, array.segment, array.rate_hz))
 
     return array.once(("vibration", parameters), find)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats
 from vgyro.fusion.blocks import PIECE, combined
 from vgyro.fusion.types import ArrayNoise, ArrayRates, CannotRun
 
@@ -125,7 +126,7 @@ def _fading(variance: np.ndarray, settled: np.ndarray, growth: np.ndarray) -> np
     return np.where(known, (finite - settled) / (finite + settled + growth), 1.0)
 
 
-def _variance(fading: np.ndarray, settled: np.ndarray, growth: np.ndarray) -> np.ndarray:
+def _variance(fading: Floats, settled: Floats, growth: Floats) -> Floats:
     return (settled + fading * (settled + growth)) / (1.0 - fading)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.blocks import combined
 from vgyro.fusion.design import SINGULAR, flaw
 from vgyro.fusion.papers.vaccaro_zaki import known_gyros, not_known
@@ -87,7 +88,7 @@ def scale_wise(
     return Fused.undelayed(combined(array.rate, weights), weights, "; ".join(one for one in notes if one))
 
 
-def least_variance(A: np.ndarray) -> np.ndarray:
+def least_variance(A: Floats) -> Floats:
     """c [N] = A⁻¹1/(1'A⁻¹1); by the pseudo-inverse of its correlation matrix where A is singular.
 
     Copies of one gyro then share its weight.
@@ -95,7 +96,8 @@ def least_variance(A: np.ndarray) -> np.ndarray:
     scale = np.sqrt(np.diag(A))
     inverse = np.linalg.pinv(A / np.outer(scale, scale), rcond=SINGULAR, hermitian=True)
     solved = inverse @ (1.0 / scale) / scale
-    return solved / solved.sum()
+    weights: Floats = solved / solved.sum()
+    return weights
 
 
 @dataclass(frozen=True)
@@ -150,5 +152,6 @@ def _variance_and_freedom(angles: Sequence[np.ndarray], factor: int) -> tuple[fl
     return value, min(number * value**2 / square if square > 0 else math.inf, max(WHITE_FREEDOM * pairs, 1.0))
 
 
-def _shares(weights: np.ndarray) -> np.ndarray:
-    return weights / weights.sum()
+def _shares(weights: Floats) -> Floats:
+    shares: Floats = weights / weights.sum()
+    return shares

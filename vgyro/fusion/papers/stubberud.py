@@ -41,7 +41,8 @@ HALF_POWER = math.sqrt(2.0 + math.sqrt(5.0))
 
 def natural_frequency(D: float, q: float) -> float:
     """ω = (q·D)^¼, rad/s.  D : information, Hz/(deg/s)²;  q : density of ẅ, deg²/s⁵"""
-    return (q * D) ** 0.25
+    frequency: float = (q * D) ** 0.25
+    return frequency
 
 
 def bandwidth(D: float, q: float) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.fusion.blocks import combined
 from vgyro.fusion.rest_scales import rest_scales
 from vgyro.fusion.types import AllanScales, ArrayRates, CannotRun, FilterParameters, Fused
@@ -61,10 +62,11 @@ def vaccaro_zaki(array: ArrayRates, parameters: FilterParameters) -> Fused:
     return Fused.undelayed(combined(array.rate, weights), weights, "; ".join(one for one in notes if one))
 
 
-def known_gyros(scales: AllanScales) -> np.ndarray:
+def known_gyros(scales: AllanScales) -> Bools:
     """bool [N]: gyros whose Allan covariances are known and whose variances are not zero."""
     variance = np.diagonal(scales.covariance, axis1=1, axis2=2)
-    return np.isfinite(variance).all(axis=0) & (variance > 0).all(axis=0)
+    known: Bools = np.isfinite(variance).all(axis=0) & (variance > 0).all(axis=0)
+    return known
 
 
 def not_known(weights: np.ndarray, used: np.ndarray) -> str:
@@ -120,7 +122,8 @@ def _terms_of_covariance(terms: np.ndarray, covariance: np.ndarray, first: np.nd
 
     first : [J], 1/(lost·C_ii·C_jj)
     """
-    weight, found = first, np.zeros(2)
+    weight = first
+    found: Floats = np.zeros(2)
     for _ in range(ROUNDS):
         last, found = found, _least_squares(terms, covariance, weight)
         weight = 1.0 / (1.0 / first + lost * (terms @ found) ** 2)
@@ -129,11 +132,12 @@ def _terms_of_covariance(terms: np.ndarray, covariance: np.ndarray, first: np.nd
     return found
 
 
-def _least_squares(terms: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _least_squares(terms: Floats, values: Floats, weight: Floats) -> Floats:
     """Weighted least squares of the columns of `terms` [J, K] to `values` [J]."""
     root = np.sqrt(weight)
     scale = np.linalg.norm(terms * root[:, None], axis=0)
-    return np.linalg.lstsq(terms * root[:, None] / scale, values * root, rcond=None)[0] / scale
+    found: Floats = np.linalg.lstsq(terms * root[:, None] / scale, values * root, rcond=None)[0] / scale
+    return found
 
 
 def _not_negative(terms: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.ndarray:

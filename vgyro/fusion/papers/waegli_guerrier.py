@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from types import ModuleType
 
 import numpy as np
 
 from vgyro import engine as engines
 from vgyro.engine.models import FAILED, GARCH_STATUSES, NO_VARIANCE, TOO_SHORT
+from vgyro.engine.protocols.engines import Engine
 from vgyro.fusion.blocks import PIECE, SampleWeights
 from vgyro.fusion.papers.arma import FEWEST, Arma, LowPass, fit_arma
 from vgyro.fusion.types import ArrayRates, CannotRun, FilterParameters, Fused
@@ -66,7 +66,7 @@ def fit_residuals(array: ArrayRates, engine: str) -> list[ResidualModel]:
     return [_model(part[:, gyro] - mean, gyro, run) for gyro in range(part.shape[1])]
 
 
-def _model(v: np.ndarray, gyro: int, run: ModuleType) -> ResidualModel:
+def _model(v: np.ndarray, gyro: int, run: Engine) -> ResidualModel:
     arma = fit_arma(v, run.kalman.low_pass)
     # e_1 = 0 is a convention, not an observation.
     errors = arma.innovations(v[1:], float(v[0]), 0.0, run.kalman.low_pass)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats, Ints
 from vgyro.runs import true_runs
 
 if TYPE_CHECKING:
@@ -64,7 +65,8 @@ def unseen(array: ArrayRates) -> np.ndarray | None:
 def away(missing: np.ndarray, least: int) -> np.ndarray:
     """Stretches [M, 2] of `least` samples or more in which one gyro has no value; missing [T] of bool."""
     edges = true_runs(missing)
-    return edges[edges[:, 1] - edges[:, 0] >= least]
+    long: Ints = edges[edges[:, 1] - edges[:, 0] >= least]
+    return long
 
 
 def _pieces(samples: int) -> list[slice]:
@@ -83,12 +85,13 @@ def _missing(rate: np.ndarray) -> np.ndarray | None:
     return None if found is None else found.T
 
 
-def _common(rate: np.ndarray, missing: np.ndarray, offset: np.ndarray) -> np.ndarray:
+def _common(rate: Floats, missing: Bools, offset: Floats) -> Floats:
     """Mean of the gyros that have a value, each less its offset [N]; NaN where none has one. rate [n, N]"""
     present = ~missing
     count = present.sum(axis=1)
     total = np.where(present, rate - offset, 0.0).sum(axis=1)
-    return np.divide(total, count, out=np.full(len(rate), np.nan), where=count > 0)
+    common: Floats = np.divide(total, count, out=np.full(len(rate), np.nan), where=count > 0)
+    return common
 
 
 def _offsets(rate: np.ndarray, missing: np.ndarray, length: int) -> np.ndarray:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.types import ArrayRates
 
 LOOK, WINDOWS = 1 << 14, 8
@@ -31,7 +32,7 @@ class CountGrid:
     step: np.ndarray
     begin: np.ndarray
 
-    def alike(self, orders: np.ndarray) -> np.ndarray:
+    def alike(self, orders: Ints) -> Floats:
         """How alike gyros round, for orders k [K] of the rounding error's series in x: 1, together; 0, each by itself.
 
         The mean of cos(2πk·(difference of their grids)/step) over the pairs.
@@ -39,7 +40,8 @@ class CountGrid:
         phase = 2.0 * math.pi * self.begin / np.where(self.step > 0, self.step, 1.0)
         gyros = len(phase)
         together = np.abs(np.exp(1j * np.multiply.outer(orders, phase)).sum(axis=1)) ** 2
-        return np.maximum((together - gyros) / (gyros * (gyros - 1)), 0.0)
+        alike: Floats = np.maximum((together - gyros) / (gyros * (gyros - 1)), 0.0)
+        return alike
 
 
 def steps(array: ArrayRates) -> np.ndarray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.metrics.allan.model import AllanModel, VarianceCurve, fit, solve
 
 FIRST_STEP, MOST_STEPS = 0.01, 30  # relative, twice as long each time
@@ -32,7 +33,7 @@ class Drawing:
         return _chi2_over_edf(normal, edf)
 
 
-def _chi2_over_edf(normal: np.ndarray, edf: np.ndarray) -> np.ndarray:
+def _chi2_over_edf(normal: Floats, edf: Floats) -> Floats:
     """Chi² over its degrees of freedom [M] at the quantiles of standard normal numbers [R, M]."""
     from scipy.special import chdtri, ndtr
 
@@ -44,7 +45,7 @@ def _chi2_over_edf(normal: np.ndarray, edf: np.ndarray) -> np.ndarray:
     return ratio
 
 
-def correlation_of(model: AllanModel, squares: np.ndarray) -> np.ndarray:
+def correlation_of(model: AllanModel, squares: Floats) -> Floats:
     """Correlation [M, M] of Allan variances at different τ: ∫ S²|H₁|²|H₂|² df, S the fitted two-sided spectrum.
 
     The covariance of two mean squares of stationary Gaussian series is 2/T times the integral of their squared
@@ -64,7 +65,8 @@ def correlation_of(model: AllanModel, squares: np.ndarray) -> np.ndarray:
     phase = np.pi * frequency * tau[:, None]
     response = 2 * np.sin(phase) ** 4 / phase**2 * spectrum * np.sqrt(frequency)
     response /= np.linalg.norm(response, axis=1, keepdims=True)
-    return response @ response.T
+    correlation: Floats = response @ response.T
+    return correlation
 
 
 def chance_of_gain(model: AllanModel, term: str, curve: VarianceCurve, drawing: Drawing) -> float:
@@ -152,4 +154,5 @@ def _crossing(share_below: Callable[[float], float], start: float, level: float,
             near = middle
     # Straight between the two, as the share is a step function of no exact crossing.
     part = (near[1] - level) / (near[1] - far[1]) if near[1] != far[1] else 1.0
-    return near[0] * (far[0] / near[0]) ** min(max(part, 0.0), 1.0)
+    crossing: float = near[0] * (far[0] / near[0]) ** min(max(part, 0.0), 1.0)
+    return crossing

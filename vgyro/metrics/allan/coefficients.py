@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.metrics.allan.coefficient_limits import Drawing, Limits, chance_of_gain
 from vgyro.metrics.allan.deviation import AllanCurve
 from vgyro.metrics.allan.model import BASE, FREE, SHAPES, AllanModel, VarianceCurve, fit, low_pass_factor
@@ -193,11 +194,12 @@ def _note(model: AllanModel, squares: np.ndarray, late: float | None, misfit: fl
 
 
 def model_deviation(
-    tau: np.ndarray, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None, passes: int = 1
-) -> np.ndarray:
+    tau: Floats, coefficients: NoiseCoefficients, bandwidth_hz: float | None = None, passes: int = 1
+) -> Floats:
     """Allan deviation of the fitted model at `tau` s, in deg/s; terms that were not estimated are left out."""
     constant = LowPass(bandwidth_hz, passes=passes).constant
     model = AllanModel(BASE + "QR", np.asarray(tau, dtype=float), constant, passes)
     squares = np.array([getattr(coefficients, term).value ** 2 for term in model.terms])
     squares[len(BASE) :] = np.nan_to_num(squares[len(BASE) :])
-    return np.sqrt(model.columns @ squares)
+    deviation: Floats = np.sqrt(model.columns @ squares)
+    return deviation

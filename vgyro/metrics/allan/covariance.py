@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats
 from vgyro.errors import TooShort
 from vgyro.metrics.allan.deviation import LEAST_USED, LONGEST_TAU, averaging_factors
 from vgyro.metrics.allan.noise_type import noise_exponents
@@ -38,7 +39,6 @@ def cross_allan(
     rate: np.ndarray,
     rate_hz: float,
     sampling: Sampling | None = None,
-    segment: np.ndarray | None = None,
     taus: np.ndarray | None = None,
     confidence: float = 0.95,
     engine: str = "native",
@@ -46,7 +46,7 @@ def cross_allan(
     """Overlapping Allan covariance and correlation of series that were sampled together.
 
     rate       : array [T, N], deg/s;  rate_hz : Hz
-    sampling   : when the samples were taken;  segment : array [T] int instead; None: there is no gap
+    sampling   : when the samples were taken; None: there is no gap
     taus       : array, s; None: three an octave, up to a third of the longest stretch
     confidence : of the limits;  engine : whose degrees of freedom
     returns    : CrossAllan. C_ij(τ) = ⟨d_i d_j⟩/2, d the differences of adjacent means over τ, over all that begin in a
@@ -61,7 +61,7 @@ def cross_allan(
     """
     rate = np.asarray(rate, dtype=float)
     if sampling is None:
-        sampling = Sampling.of(rate_hz, np.zeros(len(rate), np.int8) if segment is None else segment)
+        sampling = Sampling.of(rate_hz, np.zeros(len(rate), np.int8))
     slot, edges = sampling.slots()
     lengths, alike = np.unique(np.diff(edges), return_counts=True)
     factors = averaging_factors(rate_hz, int(lengths.max(initial=0)), taus)
@@ -111,10 +111,12 @@ def _covariance(sums: SlotSums, factor: int) -> tuple[np.ndarray, float]:
     return d.T @ d / (2 * max(number, 1)), number / max(possible, 1)
 
 
-def _correlation(covariance: np.ndarray) -> np.ndarray:
+def _correlation(covariance: Floats) -> Floats:
     deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     scale = deviation[:, :, None] * deviation[:, None, :]
-    correlation = np.clip(np.divide(covariance, scale, where=scale > 0, out=np.full(scale.shape, math.nan)), -1, 1)
+    correlation: Floats = np.clip(
+        np.divide(covariance, scale, where=scale > 0, out=np.full(scale.shape, math.nan)), -1, 1
+    )
     places = np.arange(covariance.shape[1])
     correlation[:, places, places] = np.where(deviation > 0, 1.0, math.nan)
     return correlation

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Floats, Ints
+from vgyro.engine.protocols.noise import AllanEngine
 from vgyro.errors import TooShort
 from vgyro.metrics.allan.noise_type import noise_exponents
 from vgyro.metrics.allan.robust import robust_differences, robust_edf, without_far_off
@@ -121,7 +122,7 @@ def allan_deviation(
 
 
 def _series(
-    rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: ModuleType, kind: str
+    rate: np.ndarray, segment: np.ndarray | None, sampling: Sampling | None, allan: AllanEngine, kind: str
 ) -> _CurveSeries:
     if sampling is None:
         return _CurveSeries(rate, edges_of(len(rate), segment))
@@ -134,7 +135,7 @@ def _series(
 
 
 def _variances(
-    series: _CurveSeries, factors: np.ndarray, allan: ModuleType, kind: str
+    series: _CurveSeries, factors: np.ndarray, allan: AllanEngine, kind: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Variance at each factor, and the share of the differences there are."""
     sums, share = series.sums, LONGEST[kind]
@@ -152,8 +153,8 @@ def _variances(
 
 
 def _freedom(
-    series: _CurveSeries, factors: np.ndarray, exponent: np.ndarray, share: np.ndarray, allan: ModuleType, kind: str
-) -> np.ndarray:
+    series: _CurveSeries, factors: Ints, exponent: Floats, share: Floats, allan: AllanEngine, kind: str
+) -> Floats:
     """Degrees of freedom [M]: those of all stretches that are long enough, times the share of the differences."""
     lengths, alike = np.unique(np.diff(series.edges), return_counts=True)
     estimator = "overlapping" if kind == "robust" else kind

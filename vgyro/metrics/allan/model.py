@@ -17,6 +17,8 @@ from itertools import product
 
 import numpy as np
 
+from vgyro.arrays import Floats
+
 BASE = "NBK"
 FREE = "L"
 FLICKER = 2 * math.log(2) / math.pi
@@ -95,9 +97,10 @@ class AllanModel:
         """Without the first τ."""
         return AllanModel(self.terms, self.tau[first:], self.constant, self.passes)
 
-    def at(self, squares: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    def at(self, squares: Floats, variance: Floats) -> Floats:
         """Allan variance [M] of the model, never below a small part of `variance` [M]."""
-        return np.maximum(self.columns @ squares, LOWEST_SHARE * variance)
+        found: Floats = np.maximum(self.columns @ squares, LOWEST_SHARE * variance)
+        return found
 
 
 def fit(
@@ -155,7 +158,7 @@ def solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray, bounded
     return values[best, :, row] / norm, explained[best, row]
 
 
-def _solved(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solved(gram: Floats, right: Floats) -> Floats:
     """Solutions [S, C, R] of symmetric equations; the shortest one where some are singular.
 
     They are where the weights leave a single τ: there the shapes of two terms are the same.

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from types import ModuleType
-
 import numpy as np
 
+from vgyro.engine.protocols.noise import AllanEngine
 from vgyro.metrics.allan.slots import SlotSums
 
 ENOUGH_FOR_AUTOCORRELATION = 30
@@ -16,7 +15,7 @@ STEPS = (0, -1, -2)
 
 
 def noise_exponents(
-    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType, sums: SlotSums | None = None
+    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: AllanEngine, sums: SlotSums | None = None
 ) -> np.ndarray:
     """Exponent of the power spectrum at each averaging factor: 2 … -4, never rising with τ.
 
@@ -39,7 +38,7 @@ def noise_exponents(
 
 
 def _of_whole(
-    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: ModuleType
+    rate: np.ndarray, edges: np.ndarray, factors: np.ndarray, allan: AllanEngine
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponent and weight at each factor, of gap-free stretches."""
     lengths = np.diff(edges)
@@ -60,7 +59,7 @@ def _of_whole(
     return raw, weight
 
 
-def _over_losses(sums: SlotSums, factors: np.ndarray, allan: ModuleType) -> tuple[np.ndarray, np.ndarray]:
+def _over_losses(sums: SlotSums, factors: np.ndarray, allan: AllanEngine) -> tuple[np.ndarray, np.ndarray]:
     """Exponent and weight at each factor, of runs of block means that have half of their samples."""
     raw, weight = np.zeros(len(factors)), np.ones(len(factors))
     for index, factor in enumerate(factors.tolist()):
@@ -146,5 +145,6 @@ def _expected_ratio(count: float, exponent: int) -> float:
     if exponent == 0:
         return 1.0
     if exponent == -1:
-        return count * np.log(count) / (2 * (count - 1) * np.log(2))
+        expected: float = count * np.log(count) / (2 * (count - 1) * np.log(2))
+        return expected
     return count / 2

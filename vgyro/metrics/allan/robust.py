@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Ints
 from vgyro.metrics.allan.slots import SINGLE, SlotSums, variance_of_samples
 from vgyro.metrics.outliers import find_outliers
 from vgyro.metrics.sampling import Sampling
@@ -65,5 +66,5 @@ def _median(sums: SlotSums, factor: int, share: int) -> tuple[float, float, floa
     return float(np.median(d * d)) / (2 * MEDIAN_OF_SQUARE), float(excess.mean()), len(d) / possible
 
 
-def _stride(factors: np.ndarray, slots: int) -> np.ndarray:
+def _stride(factors: Ints, slots: int) -> Ints:
     return np.maximum(np.maximum(factors // DENSE, -(-slots // MOST_DIFFERENCES)), 1)

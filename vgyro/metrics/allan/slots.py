@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
+
+from vgyro.arrays import Ints
+from vgyro.engine.protocols.noise import AllanEngine
 
 PRESENT_TENTHS = 9
 """A mean counts where so many tenths of its samples are there."""
@@ -28,7 +30,7 @@ class SlotSums:
     edges: np.ndarray
 
     @classmethod
-    def of(cls, rate: np.ndarray, slot: np.ndarray, edges: np.ndarray, allan: ModuleType) -> SlotSums:
+    def of(cls, rate: np.ndarray, slot: np.ndarray, edges: np.ndarray, allan: AllanEngine) -> SlotSums:
         """rate [T] or [T, N], deg/s; slot [T] int, rising; edges [S + 1] in slots; allan: that module of an engine."""
         if rate.ndim == 1:
             total, have = allan.slot_sums(rate, slot, edges)
@@ -90,7 +92,7 @@ def variance_of_samples(variance: np.ndarray, known: np.ndarray) -> float:
     return float(variance[:halvings].sum() / 2 * block / (block - 1)) if halvings else 0.0
 
 
-def _at(values: np.ndarray, edges: np.ndarray, number: np.ndarray, stride: int, offset: int) -> np.ndarray:
+def _at(values: np.ndarray, edges: Ints, number: Ints, stride: int, offset: int) -> np.ndarray:
     """values [P, …] at number [S] borders of each stretch, `stride` apart, the first `offset` behind its begin."""
     if len(number) == 1:
         return values[offset : offset + int(number[0]) * stride : stride][: int(number[0])]

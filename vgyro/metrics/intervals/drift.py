@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
+from vgyro.metrics.allan.coefficient_limits import Drawing
 from vgyro.metrics.allan.covariance import CrossAllan
 from vgyro.metrics.allan.deviation import LONGEST_TAU
 
@@ -121,9 +123,7 @@ def _drifts(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray) -> bool:
     return bool(p_value.min() < EVIDENCE / octaves)
 
 
-def draw(
-    model: DriftModel, stretches: int, seconds: float, taus: np.ndarray, unit_s: float, replicates: int, seed: int
-) -> Drawn:
+def draw(model: DriftModel, stretches: int, seconds: float, taus: np.ndarray, unit_s: float, drawing: Drawing) -> Drawn:
     """Draw the series of a model again and again.
 
     stretches : how many, each `seconds` long; noise of one does not go on in the next
@@ -135,8 +135,8 @@ def draw(
     factors = factors[(factors >= 1) & (factors <= blocks // LONGEST_TAU)]
     found: list[tuple[np.ndarray, ...]] = []
     sizes: list[np.ndarray] = []
-    generator = np.random.default_rng(seed)
-    for white, drift in _series(model, stretches, blocks, block_s, replicates, generator):
+    generator = np.random.default_rng(drawing.seed)
+    for white, drift in _series(model, stretches, blocks, block_s, drawing.replicates, generator):
         # How large the drift is, is not known: its variance is freedom/χ² times the one found.
         size, series = np.ones(len(white)), white
         apart = [_variance(white), np.zeros(white.shape[:2])]
@@ -154,16 +154,17 @@ def draw(
     return Drawn(mean, variance, expected, lowest, minimum, block_s)
 
 
-def _variance(series: np.ndarray) -> np.ndarray:
+def _variance(series: Floats) -> Floats:
     """Variance [r, S] of block means [r, S, stretches, blocks] about the mean of their stretch."""
-    return np.var(series, axis=-1).mean(axis=-1)
+    variance: Floats = np.var(series, axis=-1).mean(axis=-1)
+    return variance
 
 
 def _basis(tau: np.ndarray) -> np.ndarray:
     return np.column_stack([1 / tau, np.full(len(tau), FLICKER), tau / 3])
 
 
-def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int) -> np.ndarray:
+def _fit(tau: Floats, covariance: Floats, edf: Floats, number: int) -> Floats:
     """White, flicker and walk [3, S, S];  number : of these that are fitted, the others are 0"""
     scale = np.sqrt(np.diagonal(covariance[0]) * tau[0])
     scale = np.where(scale > 0, scale, 1.0)
@@ -181,19 +182,22 @@ def _fit(tau: np.ndarray, covariance: np.ndarray, edf: np.ndarray, number: int) 
                 others = left[term] - sum(gram[term, other] * terms[other] for other in range(number) if other != term)
                 terms[term] = _positive(others / gram[term, term])
         level = basis @ np.trace(terms, axis1=1, axis2=2)
-    return terms * size
+    fitted: Floats = terms * size
+    return fitted
 
 
-def _positive(matrix: np.ndarray) -> np.ndarray:
+def _positive(matrix: Floats) -> Floats:
     values, vectors = np.linalg.eigh(matrix)
-    return (vectors * np.maximum(values, 0)) @ vectors.T
+    positive: Floats = (vectors * np.maximum(values, 0)) @ vectors.T
+    return positive
 
 
-def _root(matrix: np.ndarray) -> np.ndarray:
+def _root(matrix: Floats) -> Floats:
     """[S, r] with root·root' = matrix, r its rank."""
     values, vectors = np.linalg.eigh(matrix)
     there = values > SMALL * max(values[-1], 0)
-    return vectors[:, there] * np.sqrt(values[there])
+    root: Floats = vectors[:, there] * np.sqrt(values[there])
+    return root
 
 
 def _series(
@@ -216,13 +220,13 @@ def _series(
         yield noise, drift
 
 
-def _mixed(root: np.ndarray, unit: np.ndarray) -> np.ndarray:
+def _mixed(root: Floats, unit: Floats) -> Floats:
     """root [S, r] · unit [n, r, stretches, blocks] → [n, S, stretches, blocks]."""
     count, rank, *rest = unit.shape
     return (root @ unit.reshape(count, rank, math.prod(rest))).reshape(count, len(root), *rest)
 
 
-def _unit_flicker(generator: np.random.Generator, shape: tuple[int, ...], blocks: int) -> np.ndarray:
+def _unit_flicker(generator: np.random.Generator, shape: tuple[int, ...], blocks: int) -> Floats:
     """Flicker noise with B = 1, density 1/(2πf), by normal Fourier coefficients over twice the length."""
     from scipy.fft import irfft, next_fast_len
 
@@ -231,10 +235,11 @@ def _unit_flicker(generator: np.random.Generator, shape: tuple[int, ...], blocks
     spectrum = generator.standard_normal((*shape, 2 * len(bins))).view(complex)
     spectrum *= length / np.sqrt(4 * np.pi * bins)
     spectrum[..., 0] = 0
-    return irfft(spectrum, length, overwrite_x=True)[..., :blocks]
+    flicker: Floats = irfft(spectrum, length, overwrite_x=True)[..., :blocks]
+    return flicker
 
 
-def _lowest(series: np.ndarray, factors: np.ndarray) -> np.ndarray:
+def _lowest(series: Floats, factors: Ints) -> Floats:
     """Lowest Allan deviation [r, S] of block means [r, S, stretches, blocks] at averaging factors."""
     angle = np.zeros((*series.shape[:-1], series.shape[-1] + 1))
     np.cumsum(series, axis=-1, out=angle[..., 1:])
@@ -244,4 +249,5 @@ def _lowest(series: np.ndarray, factors: np.ndarray) -> np.ndarray:
         difference = step[..., factor:] - step[..., :-factor]
         mean = np.einsum("rsnt,rsnt->rs", difference, difference) / difference[0, 0].size
         np.minimum(lowest, mean / (2 * factor**2), out=lowest)
-    return np.sqrt(lowest)
+    deviation: Floats = np.sqrt(lowest)
+    return deviation

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.metrics.intervals.block_rule import FEWEST_BLOCKS, block_length
 from vgyro.metrics.sampling import Sampling
 from vgyro.runs import run_starts
@@ -104,9 +105,10 @@ class UnitGrid:
         full = count >= MOSTLY_THERE * self.length
         return whole[full] * self.per_unit, Sampling(1 / self.unit_s, whole[full], stretch[full], 2 * self.unit_s)
 
-    def means_of(self, total: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def means_of(self, total: Floats, places: Ints) -> Floats:
         """Means [B] of the units at `places` from the sums of the parts [P]."""
-        return self._windows(total)[places] / self._windows(self.count)[places]
+        means: Floats = self._windows(total)[places] / self._windows(self.count)[places]
+        return means
 
     def _windows(self, values: np.ndarray) -> np.ndarray:
         """Sums of values [P] over a unit from every place of the even grid of parts on."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -93,19 +94,19 @@ def find_tones(spectrum: Spectrum, confidence: float = 0.95, false_alarm: float 
     for group, chance in _groups(coarse, coarse_floor, coarse_leak, false_alarm / tests, 1):
         bins = np.arange(group[0] * WIDE, (group[-1] + 1) * WIDE)
         level = np.repeat(coarse_floor.level[group[0] : group[-1] + 1], WIDE)
-        wide.append(_wide(quiet[bins], level, bins, averages, step, quantile, chance * tests))
+        wide.append(_wide(_Bins(bins, quiet[bins], level), averages, step, quantile, chance * tests))
     kept = [line for line in lines if not any(_part_of(line, hump) for hump in wide)]
     return sorted([*kept, *wide], key=lambda tone: tone.frequency)
 
 
-def share_tones(tones: Mapping[str, Sequence[Tone]]) -> dict[str, list]:
+def share_tones(tones: Mapping[str, Sequence[Tone]]) -> dict[str, list[str | float]]:
     """Columns of tones.parquet: the lines of every gyro, and which gyros have the same line.
 
     tones   : gyro → its lines
     returns : column → values, one row a gyro and line; `shared` names all gyros with a line no further off than the
               resolution, this gyro among them, in the order of `tones`
     """
-    columns: dict[str, list] = {
+    columns: dict[str, list[str | float]] = {
         name: [] for name in ("gyro", "frequency", "amplitude", "low", "high", "probability", "shared")
     }
     for gyro, lines in tones.items():
@@ -211,7 +212,7 @@ def _measure(power: np.ndarray, floor: _Floor, step: float, quantile: float, gro
     excess = power[bins] - noise
     width = excess.clip(0).sum() ** 2 / np.square(excess.clip(0)).sum()
     if width > NARROW:
-        return _wide(power[bins], np.full(bins.size, noise), bins, averages, step, quantile, chance)
+        return _wide(_Bins(bins, power[bins], np.full(bins.size, noise)), averages, step, quantile, chance)
     line = float(excess.sum())
     alone = bins.size + 8 / 9 * (bins.size - 1) + (bins.size - 2) / 18
     error_floor = bins.size**2 * 2 / (2 * floor.freedom_level[peak])
@@ -228,17 +229,24 @@ def _measure(power: np.ndarray, floor: _Floor, step: float, quantile: float, gro
     )
 
 
-def _wide(
-    power: np.ndarray, level: np.ndarray, bins: np.ndarray, averages: float, step: float, quantile: float, chance: float
-) -> Tone:
-    """A line of finite width: bins [B] with their power and floor; the power in it varies as that of noise does."""
+class _Bins(NamedTuple):
+    """Bins [B] of a spectrum, with their power and their floor."""
+
+    number: np.ndarray
+    power: np.ndarray
+    level: np.ndarray
+
+
+def _wide(line: _Bins, averages: float, step: float, quantile: float, chance: float) -> Tone:
+    """A line of finite width; the power in it varies as that of noise does."""
+    bins, power, level = line
     excess = np.maximum(power - level, 0.0)
-    line, square = float(np.sum(power - level)), float(np.square(power).sum())
+    total, square = float(np.sum(power - level)), float(np.square(power).sum())
     centre = float(excess @ bins / excess.sum())
     around = math.sqrt(float(excess @ np.square(bins - centre) / excess.sum()))
-    amplitude = math.sqrt(2 * max(line, 0.0) * step)
-    error = quantile * math.sqrt(square * HANN_POWER / averages) / max(line, 1e-300) / 2 * amplitude
-    jitter = quantile * around * math.sqrt(HANN_POWER * square / averages) / max(line, 1e-300)
+    amplitude = math.sqrt(2 * max(total, 0.0) * step)
+    error = quantile * math.sqrt(square * HANN_POWER / averages) / max(total, 1e-300) / 2 * amplitude
+    jitter = quantile * around * math.sqrt(HANN_POWER * square / averages) / max(total, 1e-300)
     resolution = max(HANN_BINS, 2 * around) * step
     return Tone(
         centre * step, amplitude, max(amplitude - error, 0.0), amplitude + error, chance, resolution, jitter * step

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.config import MetricsOptions
 from vgyro.metrics.figures import Reading
 from vgyro.metrics.improvement import improvement_by_draws, improvement_factor
@@ -95,14 +96,16 @@ def array_moments(
     )  # fmt: skip
 
 
-def _mean(sums: Units) -> np.ndarray:
-    return sums.total.sum(axis=0) / sums.count.sum()
+def _mean(sums: Units) -> Floats:
+    mean: Floats = sums.total.sum(axis=0) / sums.count.sum()
+    return mean
 
 
-def _sigma(sums: Units) -> np.ndarray:
+def _sigma(sums: Units) -> Floats:
     count, mean = sums.count.sum(), _mean(sums)
     squares = np.sum(sums.squares - 2 * mean * sums.total + sums.count[:, None] * mean**2, axis=0)
-    return np.sqrt(np.maximum(squares, 0) / max(count - 1, 1))
+    sigma: Floats = np.sqrt(np.maximum(squares, 0) / max(count - 1, 1))
+    return sigma
 
 
 def _about_block_means(sums: Units, units: int) -> tuple[np.ndarray, np.ndarray]:

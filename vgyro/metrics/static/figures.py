@@ -10,6 +10,7 @@ import numpy as np
 
 from vgyro.config import MetricsOptions
 from vgyro.errors import TooShort
+from vgyro.metrics.allan.coefficient_limits import Drawing
 from vgyro.metrics.allan.covariance import CrossAllan, cross_allan
 from vgyro.metrics.allan.deviation import AllanCurve
 from vgyro.metrics.equal_bandwidth import BY_SHAPE, OTHER_SHAPE, SETTLED, LowPass, common_bandwidth, run_back
@@ -224,7 +225,7 @@ def _draw(model: DriftModel, shared: RestRecording, measured: Sequence[Measured]
     shortest = unit_s * max(math.ceil(BLOCKS_APART * felt / unit_s), 1)
     taus = min((one.curve.tau for one in measured), key=lambda tau: float(tau[-1]))
     options = shared.options
-    return draw(model, stretches, seconds, taus, shortest, options.bootstrap, options.seed)
+    return draw(model, stretches, seconds, taus, shortest, Drawing(options.bootstrap, options.seed))
 
 
 def _add_equal(readings: list[dict[str, Reading]], shared: RestRecording, array: _Array, confidence: float) -> None:

@@ -32,21 +32,19 @@ def paper_readings(
     spectrum: Spectrum,
     coefficients: NoiseCoefficients,
     rate_hz: float,
-    bandwidth_hz: float | None = None,
-    dc_gain: float = 1.0,
-    passes: int = 1,
+    low_pass: LowPass | None = None,
 ) -> dict[str, Reading]:
     """Noise density, ARW, RRW, bias drift, bias instability, quantisation and ramp of one series in the field's units.
 
     curve, spectrum, coefficients : of the series, in deg/s
-    bandwidth_hz, dc_gain, passes : of a filter that it went through, as LowPass; a bandwidth of None: not limited
+    low_pass : that it went through; None: none
     returns : noise_density deg/s/√Hz (two-sided), arw_1s and arw deg/√h, density_ratio, quantisation deg, rrw_read and
               rrw deg/h/√h, rate_ramp deg/h², bias_drift and bias_instability deg/h, bias_drift_tau s
     Jiang et al. (2012), table 2; Liu et al. (2015), table 3; IEEE Std 952-1997 for the fitted terms.
     """
-    low_pass = LowPass(bandwidth_hz, dc_gain, passes)
+    low_pass = low_pass or LowPass()
     notes = [SMOOTHER if low_pass.other_shape else "", coefficients.note]
-    density = noise_density(spectrum, flat_band(rate_hz, bandwidth_hz), curve.confidence)
+    density = noise_density(spectrum, flat_band(rate_hz, low_pass.bandwidth_hz), curve.confidence)
     drift, drift_tau = bias_drift(curve, low_pass.shortest_tau)
     white = _fitted(coefficients.N, units.arw_deg_rt_h, "; ".join(filter(None, notes)))
     level = Reading(density.value, density.low, density.high, _density_note(density.value, density.band))
@@ -54,7 +52,7 @@ def paper_readings(
         "noise_density": level,
         "arw_1s": _arw_at_one_second(curve, low_pass),
         "arw": replace(white, flags=white.flags | {"band_limited"}) if low_pass.other_shape else white,
-        "density_ratio": density_ratio(level, coefficients.N, curve.confidence, dc_gain),
+        "density_ratio": density_ratio(level, coefficients.N, curve.confidence, low_pass.dc_gain),
         "quantisation": _fitted(coefficients.Q, float, coefficients.note),
         "rrw_read": rrw_read(curve, low_pass.shortest_tau),
         "rrw": _fitted(coefficients.K, units.rrw_deg_h_rt_h, coefficients.note),

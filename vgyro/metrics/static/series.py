@@ -115,9 +115,10 @@ class RestRecording:
         }  # fmt: skip
         spectrum = spectral_density(cleaned, rate_hz, options.welch_s, self.segment)
         curve = curves["overlapping"]
-        band, gain, passes = low_pass.bandwidth_hz, low_pass.dc_gain, low_pass.passes
-        fitted = noise_coefficients(curve, band, gain, options.bootstrap, options.seed, passes=passes)
-        readings = paper_readings(curve, spectrum, fitted, rate_hz, band, gain, passes)
+        fitted = noise_coefficients(
+            curve, low_pass.bandwidth_hz, low_pass.dc_gain, options.bootstrap, options.seed, passes=low_pass.passes
+        )
+        readings = paper_readings(curve, spectrum, fitted, rate_hz, low_pass)
         readings["missing"] = counted(self.missing)
         if options.outlier_threshold is not None:
             readings["outliers"] = counted(int(outliers.sum()))

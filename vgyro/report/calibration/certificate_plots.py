@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 from markupsafe import Markup
 
 from vgyro.report.html import details, join
 from vgyro.report.model import Record
-from vgyro.report.plots import Axis, Curve, Marker, curve_plot
+from vgyro.report.plots import Axis, Curve, Marker, PlotFrame, PlotMarks, curve_plot
 
 NAN = float("nan")
 MOST_SHOWN = 2  # six loops over each other show nothing
@@ -57,7 +57,9 @@ def _residuals(axis: str, gyros: Mapping[str, Record]) -> Markup:
     )
     y = Axis("output − line, deg/s")
     return curve_plot(
-        f"scale-residuals-{axis}", title, curves, TABLE_RATE, y, summary=summary, levels=(0.0,), height=300
+        PlotFrame(f"scale-residuals-{axis}", title, TABLE_RATE, y, summary=summary, height=300),
+        curves,
+        PlotMarks(levels=(0.0,)),
     )
 
 
@@ -68,13 +70,22 @@ def _fit(axis: str, gyros: Mapping[str, Record]) -> Markup:
         rate, mean = (_column(points, key) for key in ("rate", "mean_count"))
         curves.append(Curve(name, name, rate, mean, colour=index, points=True))
     y = Axis("mean output, counts")
-    return curve_plot(f"scale-factor-{axis}", "Mean output at each rate", curves, TABLE_RATE, y, height=300)
+    return curve_plot(PlotFrame(f"scale-factor-{axis}", "Mean output at each rate", TABLE_RATE, y, height=300), curves)
 
 
-def _with_temperature(gyros: Mapping[str, Record]) -> list[tuple[int, str, Record, Record]]:
-    """Place, name, record and temperature record of the gyros that have one."""
+class _WarmGyro(NamedTuple):
+    """Place, name, record and temperature record of a gyro."""
+
+    place: int
+    name: str
+    record: Record
+    temperature: Record
+
+
+def _with_temperature(gyros: Mapping[str, Record]) -> list[_WarmGyro]:
+    """The gyros that have a temperature record."""
     return [
-        (index, name, record, record["temperature"])
+        _WarmGyro(index, name, record, record["temperature"])
         for index, (name, record) in enumerate(gyros.items())
         if record.get("temperature")
     ]
@@ -102,14 +113,9 @@ def _bias_plot(axis: str, gyros: Mapping[str, Record]) -> Markup:
     title, y = "Bias against temperature", Axis("less that at the reference, deg/s")
     summary = "the curve is laid through the line's bias; points beside it: bend of the line, other power cycles"
     return curve_plot(
-        f"bias-temperature-{axis}",
-        title,
+        PlotFrame(f"bias-temperature-{axis}", title, Axis("temperature, °C"), y, summary=summary, height=260),
         curves,
-        Axis("temperature, °C"),
-        y,
-        summary=summary,
-        levels=(0.0,),
-        height=260,
+        PlotMarks(levels=(0.0,)),
     )
 
 
@@ -130,6 +136,7 @@ def _scale_plot(axis: str, gyros: Mapping[str, Record]) -> Markup:
     title, summary = "Scale factor against temperature", "bars: limits of the slope"
     y = Axis("change, ppm")
     return curve_plot(
-        f"scale-temperature-{axis}", title, curves, Axis("temperature, °C"), y, summary=summary, levels=(0.0,),
-        height=260,
-    )  # fmt: skip
+        PlotFrame(f"scale-temperature-{axis}", title, Axis("temperature, °C"), y, summary=summary, height=260),
+        curves,
+        PlotMarks(levels=(0.0,)),
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from markupsafe import Markup
 
@@ -54,7 +55,7 @@ def failures(array: ArrayPart) -> int:
     return 0 if table is None else int((~table["passed"].astype(bool)).sum())
 
 
-def _row(row: dict) -> TableRow:
+def _row(row: dict[str, Any]) -> TableRow:
     passed = bool(row["passed"])
     numbers = [
         Cell(significant(float(row[name]), digits))

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from vgyro.report.html import heading, join, paragraph
 from vgyro.report.model import ArrayPart, DatasetPart, Record, Table
 from vgyro.report.numbers import percent, plain, rounded, significant, with_interval
-from vgyro.report.plots import Axis, Curve, curve_plot
+from vgyro.report.plots import Axis, Curve, PlotFrame, PlotMarks, curve_plot
 from vgyro.report.tables import Cell, TableColumn, TableRow, render_table
 
 TITLE = "How many more gyros would help"
@@ -58,7 +58,11 @@ def _plot(array: ArrayPart, table: Table, summary: Record) -> Markup:
         curves.append(Curve("this array", "this array", *here, ink=True, points=True, line=False, marker="triangle"))
     axes = Axis("number of gyros"), Axis("factor over one gyro")
     lines = [float(summary["gyros"])]
-    return curve_plot(f"more-{array.anchor}", "White noise against the number of gyros", curves, *axes, lines=lines)
+    return curve_plot(
+        PlotFrame(f"more-{array.anchor}", "White noise against the number of gyros", *axes),
+        curves,
+        PlotMarks(lines=lines),
+    )
 
 
 def _curve(table: Table, correlation: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from vgyro.report.envelope import logarithmic
 from vgyro.report.html import details, join, paragraph
 from vgyro.report.model import ArrayPart, Record, Table, rows_of
 from vgyro.report.numbers import probability, significant
-from vgyro.report.plots import Axis, Curve, curve_plot
+from vgyro.report.plots import Axis, Curve, PlotFrame, PlotMarks, curve_plot
 from vgyro.report.tables import Cell, TableColumn, number_cell, render_table
 
 # What a first look needs; the rest is one click away.
@@ -50,13 +50,15 @@ def allan_plot(array: ArrayPart) -> Markup:
             drawn = [replace(curve, name=f"{curve.name} {kind}", group=group, visible=False) for curve in drawn]
         curves += drawn
     return curve_plot(
-        f"allan-{array.anchor}",
-        "Overlapping Allan deviation",
+        PlotFrame(
+            f"allan-{array.anchor}",
+            "Overlapping Allan deviation",
+            Axis("averaging time τ, s", "log"),
+            Axis("Allan deviation σ, deg/s", "log"),
+            summary="bars: limits by chi²; 3600·σ is in deg/h, 60·σ(1 s) is the ARW read at 1 s in deg/√h",
+            height=460,
+        ),
         curves,
-        Axis("averaging time τ, s", "log"),
-        Axis("Allan deviation σ, deg/s", "log"),
-        summary="bars: limits by chi²; 3600·σ is in deg/h, 60·σ(1 s) is the ARW read at 1 s in deg/√h",
-        height=460,
     )
 
 
@@ -78,14 +80,16 @@ def spectrum_plot(array: ArrayPart) -> Markup:
     tones = strongest_tones(array, MOST_MARKED)
     marked = f"; dashed: the {'strongest ' if len(tones) == MOST_MARKED else ''}tones" if tones else ""
     return curve_plot(
-        f"spectrum-{array.anchor}",
-        "Noise spectrum, ONE-sided",
+        PlotFrame(
+            f"spectrum-{array.anchor}",
+            "Noise spectrum, ONE-sided",
+            Axis("frequency, Hz", "log"),
+            Axis("amplitude density, one-sided, deg/s/√Hz", "log"),
+            summary=f"the two-sided density, which N and the papers use, is smaller by √2{marked}",
+            height=400,
+        ),
         _curves(array, table, pick, points=False),
-        Axis("frequency, Hz", "log"),
-        Axis("amplitude density, one-sided, deg/s/√Hz", "log"),
-        summary=f"the two-sided density, which N and the papers use, is smaller by √2{marked}",
-        lines=[float(tone["frequency"]) for tone in tones],
-        height=400,
+        PlotMarks(lines=[float(tone["frequency"]) for tone in tones]),
     )
 
 
@@ -148,14 +152,16 @@ def cross_allan_plot(array: ArrayPart) -> Markup:
         shown = index < PAIRS_SHOWN
         curves.append(Curve(name, name, tau, value, low, high, colour=index, points=True, visible=shown))
     return curve_plot(
-        f"cross-allan-{array.anchor}",
-        "Allan covariance of pairs of gyros over their deviations",
+        PlotFrame(
+            f"cross-allan-{array.anchor}",
+            "Allan covariance of pairs of gyros over their deviations",
+            Axis("averaging time τ, s", "log"),
+            Axis("Allan correlation"),
+            summary=f"bars: limits; what two gyros share no average of them takes away{some}",
+            height=300,
+        ),
         curves,
-        Axis("averaging time τ, s", "log"),
-        Axis("Allan correlation"),
-        summary=f"bars: limits; what two gyros share no average of them takes away{some}",
-        levels=(0.0,),
-        height=300,
+        PlotMarks(levels=(0.0,)),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from markupsafe import Markup
 
@@ -34,7 +35,7 @@ def delays_part(recording: RecordingPart, array: ArrayPart) -> Markup:
     return join(details(title, table, opened=bool(late)))
 
 
-def _cells(name: str, entry: dict) -> tuple[Cell, ...]:
+def _cells(name: str, entry: dict[str, Any]) -> tuple[Cell, ...]:
     limits = [math.nan if entry[key] is None else 1e3 * float(entry[key]) for key in ("delay_s", "low_s", "high_s")]
     removed = bool(entry["removed"])
     return (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from markupsafe import Markup
 
@@ -9,7 +11,7 @@ from vgyro.report.envelope import broken
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import ArrayPart, RecordingPart, Table, rows_of
 from vgyro.report.numbers import duration, rounded
-from vgyro.report.plots import Axis, Curve, curve_plot
+from vgyro.report.plots import Axis, Curve, PlotFrame, PlotMarks, curve_plot
 from vgyro.report.recordings.faults import fault_times
 from vgyro.report.tables import Cell, TableColumn, render_table
 
@@ -35,11 +37,20 @@ def rates_plots(recording: RecordingPart, array: ArrayPart) -> Markup:
         curves.append(Curve(REFERENCE, REFERENCE, rates.time, rates.reference, ink=True, width=1))
     spans, faults = rates.spans, fault_times(array)
     summary += "; dashed: begin and end of faults" if faults else ""
-    whole = curve_plot(f"rates-{array.anchor}", title, curves, TIME, RATE, summary=summary, spans=spans, lines=faults)
+    whole = curve_plot(
+        PlotFrame(f"rates-{array.anchor}", title, TIME, RATE, summary=summary),
+        curves,
+        PlotMarks(spans=spans, lines=faults),
+    )
     if not spans:
         return whole
     still = _rate_curves(rates.time, rates.rest, array)
-    return join(whole, curve_plot(f"rest-{array.anchor}", f"{title}, at rest only", still, TIME, RATE, spans=spans))
+    return join(
+        whole,
+        curve_plot(
+            PlotFrame(f"rest-{array.anchor}", f"{title}, at rest only", TIME, RATE), still, PlotMarks(spans=spans)
+        ),
+    )
 
 
 def _rate_curves(time: np.ndarray, columns: Table, array: ArrayPart) -> list[Curve]:
@@ -66,7 +77,7 @@ def temperature_plot(recording: RecordingPart) -> Markup:
         for i, (name, values) in enumerate(rates.temperatures.items())
     ]
     identifier = f"temperature-{recording.name}"
-    return curve_plot(identifier, "Temperature", curves, TIME, Axis("temperature, °C"), height=240)
+    return curve_plot(PlotFrame(identifier, "Temperature", TIME, Axis("temperature, °C"), height=240), curves)
 
 
 def correlation_table(recording: RecordingPart, array: ArrayPart) -> Markup:
@@ -86,7 +97,7 @@ def correlation_table(recording: RecordingPart, array: ArrayPart) -> Markup:
     return render_table(columns, rows, caption, compact=True)
 
 
-def _correlation_cell(row: dict | None, diagonal: bool) -> Cell:
+def _correlation_cell(row: dict[str, Any] | None, diagonal: bool) -> Cell:
     if row is None or not np.isfinite(row["correlation"]):
         return Cell("—", tone="muted", hint="a gyro whose output does not vary has no correlation")
     value, low, high = float(row["correlation"]), float(row["low"]), float(row["high"])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from vgyro.arrays import Floats
 from vgyro.report.html import join, paragraph
 from vgyro.report.model import ArrayPart, Table
 from vgyro.report.numbers import MISSING, count, significant
@@ -51,10 +52,11 @@ class ComparedFits:
     least: np.ndarray
 
     @property
-    def ratio(self) -> np.ndarray:
+    def ratio(self) -> Floats:
         """1σ over that of DCC, where both are known."""
         ratio = self.sigma / self.of_dcc
-        return ratio[np.isfinite(ratio)]
+        known: Floats = ratio[np.isfinite(ratio)]
+        return known
 
     @property
     def mean_ratio(self) -> float:
@@ -96,10 +98,11 @@ def compare(table: Table, rows: np.ndarray | None = None) -> list[ComparedFits]:
     known = np.isfinite(bic).all(axis=0)
     least = np.argmin(bic[:, known], axis=0) if known.any() else np.empty(0, dtype=int)
 
-    def column(model: str, name: str) -> np.ndarray:
-        return np.asarray(table[name][of[model]], dtype=float)[known]
+    def column(model: str, name: str) -> Floats:
+        values: Floats = np.asarray(table[name][of[model]], dtype=float)[known]
+        return values
 
-    def more(model: str, name: str) -> np.ndarray:
+    def more(model: str, name: str) -> Floats:
         return column(model, name) - column(OURS, name)
 
     return [

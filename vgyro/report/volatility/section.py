@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -10,7 +11,7 @@ from markupsafe import Markup
 from vgyro.report.html import details, heading, join, paragraph
 from vgyro.report.model import ArrayPart, DccSummary, GarchSummary, Record, Table, VolatilityPart, WeightCurves, rows_of
 from vgyro.report.numbers import MISSING, count, percent, probability, significant
-from vgyro.report.plots import Axis, Curve, curve_plot
+from vgyro.report.plots import Axis, Curve, PlotFrame, curve_plot
 from vgyro.report.tables import Cell, TableColumn, TableRow, render_table
 from vgyro.report.volatility.arch import effects_table
 from vgyro.report.volatility.bekk import bekk_part
@@ -75,7 +76,7 @@ def _arch_rows(table: Table) -> list[list[Cell]]:
     return rows
 
 
-def _arch_cells(row: dict | None) -> list[Cell]:
+def _arch_cells(row: dict[str, Any] | None) -> list[Cell]:
     if row is None or row["status"] != "ok":
         why = "not tested" if row is None else str(row["status"])
         return [Cell(MISSING, tone="muted", hint=why)] * 3
@@ -149,7 +150,9 @@ def _dcc(anchor: str, summary: DccSummary) -> Markup:
         ]
         some = "" if len(drawn) == summary.windows else f"{count(len(drawn))} of {count(summary.windows)} windows"
         title = "DCC parameters, each window at its end"
-        parts.append(curve_plot(f"dcc-{anchor}", title, curves, TIME, Axis("a, b"), summary=some, height=240))
+        parts.append(
+            curve_plot(PlotFrame(f"dcc-{anchor}", title, TIME, Axis("a, b"), summary=some, height=240), curves)
+        )
     return join(*parts, paragraph(TEST_WORDS, "note"))
 
 
@@ -191,7 +194,7 @@ def _weights(anchor: str, array: ArrayPart, parts: Sequence[WeightCurves]) -> Ma
         curves = [Curve(name, name, time, part.curves[f"w_{name}"], colour=i) for i, name in enumerate(array.gyros)]
         identifier = f"weights-{anchor}-{part.model}-{part.mode}"
         title, axis = f"Weights, {_words(part)}", Axis("weight")
-        plots.append(curve_plot(identifier, title, curves, TIME, axis, summary=_fallbacks(part), height=260))
+        plots.append(curve_plot(PlotFrame(identifier, title, TIME, axis, summary=_fallbacks(part), height=260), curves))
     return join(*plots)
 
 
@@ -206,7 +209,7 @@ def _deviations(anchor: str, array: ArrayPart, part: WeightCurves) -> Markup:
     if not any(np.isfinite(curve.y).any() for curve in curves):
         return Markup("")
     title = f"Conditional standard deviation of each gyro and of the fused rate ({_words(part)})"
-    return curve_plot(f"sd-{anchor}", title, curves, TIME, Axis("√h, deg/s"), height=260)
+    return curve_plot(PlotFrame(f"sd-{anchor}", title, TIME, Axis("√h, deg/s"), height=260), curves)
 
 
 def _fallbacks(part: WeightCurves) -> str:

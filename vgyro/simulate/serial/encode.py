@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Ints
 from vgyro.board import TYPE_BYTES, BinaryFrame, Board, Checksum, TextFrame
 from vgyro.errors import DataError
 
@@ -118,12 +119,14 @@ def _add_checksum(frames: np.ndarray, checksum: Checksum, order: str) -> None:
     frames[:, at : at + width] = to_bytes(value, f"u{checksum.width}", order)
 
 
-def _checksum(covered: np.ndarray, checksum: Checksum) -> np.ndarray:
+def _checksum(covered: Ints, checksum: Checksum) -> Ints:
     if checksum.family == "crc":
         return crc(covered, checksum)
     if checksum.family == "xor":
-        return np.bitwise_xor.reduce(covered, axis=1).astype(np.int64)
-    return covered.sum(axis=1, dtype=np.int64) % (1 << checksum.width)
+        found: Ints = np.bitwise_xor.reduce(covered, axis=1).astype(np.int64)
+        return found
+    found = covered.sum(axis=1, dtype=np.int64) % (1 << checksum.width)
+    return found
 
 
 def crc(covered: np.ndarray, checksum: Checksum) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.storage.clocks.windows import (
     SHORT_STEPS,
     forward_min,
@@ -131,21 +132,26 @@ def judge(times: np.ndarray, resolution: float, finest: float, meaning: str) -> 
     if jitter > SMALL_JITTER:
         jitter = _local_jitter(times, period)
     why = f"{why}; {why_time}"
-    return _even(times, period, resolution, jitter, time_from, steady, coarse, beat, why)
+    return _even(times, _Grid(period, resolution, jitter, steady, coarse, beat), time_from, why)
 
 
-def _even(
-    times: np.ndarray,
-    period: float,
-    resolution: float,
-    jitter: float,
-    time_from: Literal["stamps", "line", "envelope"],
-    steady: bool,
-    coarse: bool,
-    beat: Beat | None,
-    why: str,
-) -> Judgement:
+class _Grid(NamedTuple):
+    """An even grid as its stamps show it: period, s; their resolution, s; r.m.s. jitter, periods.
+
+    steady : single steps show losses;  coarse : stamps are rounded;  beat : odd steps that come regularly
+    """
+
+    period: float
+    resolution: float
+    jitter: float
+    steady: bool
+    coarse: bool
+    beat: Beat | None
+
+
+def _even(times: np.ndarray, grid: _Grid, time_from: Literal["stamps", "line", "envelope"], why: str) -> Judgement:
     """How losses are looked for on a grid."""
+    period, resolution, jitter, steady, coarse, beat = grid
     horizon, reach = _horizon(len(times), resolution / period), REACH
     if beat is not None:
         # A rounded stamp moves against the grid for as many rows before it jumps back.
@@ -232,7 +238,7 @@ def _time_from(
     return "envelope", "far off an even grid for a while, but not for good: stamps are arrival times"
 
 
-def _blocks(times: np.ndarray, period: float, width: int) -> np.ndarray:
+def _blocks(times: Floats, period: float, width: int) -> Floats:
     """[n / width, width]: distance from a line of that period, block by block."""
     rest = times - period * np.arange(len(times))
     width = max(1, min(width, len(times)))

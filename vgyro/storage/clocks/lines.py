@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import solveh_banded
 
+from vgyro.arrays import Floats, Ints
+
 KNOT_BINS = (24, 8)  # bins from knot to knot of a line that bends; the second if the first does not bend enough
 MIN_BEND_BINS = 48
 LEVEL_BINS = 24
@@ -63,10 +65,11 @@ class ClockLine:
     knots: np.ndarray
     values: np.ndarray
 
-    def __call__(self, counter: np.ndarray) -> np.ndarray:
+    def __call__(self, counter: Ints) -> Floats:
         """[n] sample numbers → [n] s, 0 at the first."""
         zero = float(np.interp(0.0, self.knots, self.values))
-        return self.period * counter + (np.interp(counter, self.knots, self.values) - zero)
+        time: Floats = self.period * counter + (np.interp(counter, self.knots, self.values) - zero)
+        return time
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.storage.clocks.evenness import ENVELOPE_ROWS, Judgement, level_slope
 from vgyro.storage.clocks.windows import backward_min, forward_min
 
@@ -138,8 +139,7 @@ class LossFinder:
         lasts = _lasting(rest, near, half, period, last)
         # Rows too near the end of a piece are not judged.
         stop = min(high, len(times) - tail_rows(grid) + 1) if last else high
-        limit = (grid.least_loss - 0.5) * period
-        scan = _Scan(raised, ahead, lasts, period, limit, width, grid)
+        scan = _Scan(raised, ahead, lasts, period, grid)
         found = scan.run(max(low, 1), stop)
         shifts = np.zeros(high)
         shifts[found.rows] = found.shift
@@ -168,19 +168,12 @@ class _Scan:
     """Walk through the lasting steps of one stretch, in order."""
 
     def __init__(
-        self,
-        raised: np.ndarray,
-        ahead: np.ndarray,
-        lasts: np.ndarray,
-        period: float,
-        limit: float,
-        width: int,
-        grid: Judgement,
+        self, raised: np.ndarray, ahead: np.ndarray, lasts: np.ndarray, period: float, grid: Judgement
     ) -> None:
         self.raised, self.ahead, self.lasts = raised, ahead, lasts
-        self.period, self.limit, self.width = period, limit, width
+        self.period, self.limit, self.width = period, (grid.least_loss - 0.5) * period, grid.horizon
         self.noise, self.reach = grid.noise, grid.reach
-        self._first = backward_min(raised, width)
+        self._first = backward_min(raised, self.width)
 
     def run(self, low: int, stop: int) -> FoundEvents:
         rows: list[int] = []
@@ -225,7 +218,7 @@ class _Scan:
         step = self.ahead[row : row + len(behind)] - behind
         return np.where(np.isfinite(step), step, -np.inf)
 
-    def _height(self, step: np.ndarray, row: int, hit: int) -> float:
+    def _height(self, step: Floats, row: int, hit: int) -> float:
         """The median step of the rows after it, as long as there are as many to come.
 
         The rows just before the loss, and the next loss, may spoil some: if it is not whole, shorter stretches (unless
@@ -238,7 +231,8 @@ class _Scan:
         if settle == SETTLE and len(self.ahead) - row - hit > 2 * self.reach:
             others += [step[hit + settle : hit + 2 * settle], step[hit + 2 * settle : hit + self.reach]]
         heights = [middle, *(float(np.median(part)) for part in others if len(part))]
-        return next((height for height in heights if self._weigh(height)[0]), middle)
+        whole: float = next((height for height in heights if self._weigh(height)[0]), middle)
+        return whole
 
     def _place(self, row: int, shift: float, stop: int) -> int:
         """The loss comes after the last row that is still below the new level."""

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Bools
+
 MIN_RUNS = 20
 TWO_LENGTHS = 0.8  # share of runs with one of two adjacent lengths; by chance at most 0.385
 BEAT_ROWS = 16.0  # variance of the rows in a window, if lengths came by chance
@@ -120,7 +122,7 @@ class Keeper:
             keep[keep] = chosen
         return keep
 
-    def _chosen(self, same: np.ndarray) -> np.ndarray:
+    def _chosen(self, same: Bools) -> Bools:
         """bool [n]: the first row of each reading; in a run too long for one reading, where the next ones are due."""
         if not len(same):
             return same
@@ -129,4 +131,5 @@ class Keeper:
         offset = np.where(new > 0, rows - new, self._offset + rows)
         self._offset = int(offset[-1])
         readings = np.floor(offset / self.rule.held + 1e-9)
-        return np.ceil(readings * self.rule.held - 1e-9) == offset
+        chosen: Bools = np.ceil(readings * self.rule.held - 1e-9) == offset
+        return chosen

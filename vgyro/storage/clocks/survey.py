@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from vgyro import units
+from vgyro.arrays import Bools
 from vgyro.errors import DataError
 from vgyro.storage.clocks.clock import Clock, Track
 from vgyro.storage.clocks.evenness import SHORTEST_PERIOD, Judgement
@@ -82,7 +83,7 @@ class _Pass:
             self._check_restarts(self.rows + len(chunk.stamps))
         self.rows += len(chunk.stamps)
 
-    def _bad(self, chunk: Chunk) -> np.ndarray:
+    def _bad(self, chunk: Chunk) -> Bools:
         rules = self.rules
         assert rules.unfold is not None
         around = np.concatenate([chunk.before, chunk.stamps, chunk.after])

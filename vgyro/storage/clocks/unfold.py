@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
+
 DAY_S = 86_400.0
 LONGEST_STEP = 1e9  # periods; the clock was set if the stamps jump by more
 FAR = 1000  # periods that may pass across a wrap that is known to exist
@@ -48,14 +50,14 @@ def known_wraps(unit: str, scale: float) -> tuple[float, ...]:
     return tuple(sorted({*counters, 60 / scale, 3600 / scale, DAY_S / scale}))
 
 
-def usable(stamps: np.ndarray, scale: float) -> np.ndarray:
+def usable(stamps: Floats, scale: float) -> Bools:
     """bool [n]: stamps that can be reckoned with."""
     if np.issubdtype(stamps.dtype, np.integer):
         return (stamps > -INT_LIMIT) & (stamps < INT_LIMIT)
     return np.isfinite(stamps) & (np.abs(stamps) < LATEST_S / scale)
 
 
-def spikes(stamps: np.ndarray, good: np.ndarray, rule: UnfoldRule) -> np.ndarray:
+def spikes(stamps: Floats, good: Bools, rule: UnfoldRule) -> Bools:
     """bool [n]: stamps far off while those before and after fit each other: one damaged number. Never the ends."""
     found = np.zeros(len(stamps), dtype=bool)
     if len(stamps) < 3:

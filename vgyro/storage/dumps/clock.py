@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Ints
 from vgyro.board import Board
 from vgyro.storage.dumps.scan import Content, FoundFrames
 from vgyro.storage.dumps.selection import CounterRule
@@ -273,7 +274,7 @@ class FrameClock:
             self._remembered -= len(self._history.popleft().key)
         return fresh
 
-    def _suspects(self, key: np.ndarray, breaks: np.ndarray) -> np.ndarray:
+    def _suspects(self, key: np.ndarray, breaks: Ints) -> Ints:
         """Rows whose counter (or time stamp) does not advance: they may have been sent before."""
         rows = breaks if self._rule and self._rule.is_long else np.arange(len(key))
         earlier = key[rows - 1]
@@ -284,7 +285,8 @@ class FrameClock:
         if self._rule is None:
             return rows[key[rows] <= earlier]
         reach = min(HISTORY * self._rule.step, self._rule.modulus // 2)
-        return rows[(earlier - key[rows]) % self._rule.modulus <= reach]
+        late: Ints = rows[(earlier - key[rows]) % self._rule.modulus <= reach]
+        return late
 
     def _told_apart(self, key: np.ndarray, content: Content, suspects: np.ndarray) -> np.ndarray:
         """bool [n]: false for the suspects that were sent before, and for what follows them in the same order."""

@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Ints
 from vgyro.board import TYPE_BYTES, BinaryFrame, Board, ByteOrder
 from vgyro.engine.frames import FrameColumn
+from vgyro.engine.reference.frames import verifier
 from vgyro.storage.dumps.rechecksum import right_checksum, same_order, shown_key
 from vgyro.storage.layout import columns_of
 
@@ -168,7 +170,7 @@ def _other_sync(buffer: np.ndarray, frame: BinaryFrame, length: int, board: Boar
     base = frame if length == frame.length else _with_length(frame, length, start).frame
     if len(start) < FEWEST or not _holds_all(base):
         return
-    verify = engines.get("reference").frames.verifier(base)
+    verify = verifier(base)
     for offset in range(length):
         places = start + offset
         if base.checksum.family != "none":
@@ -278,13 +280,14 @@ def _flipped(order: ByteOrder) -> ByteOrder:
     return "little" if order == "big" else "big"
 
 
-def _steps(buffer: np.ndarray, places: np.ndarray, board: Board, frame: BinaryFrame) -> np.ndarray:
+def _steps(buffer: Ints, places: Ints, board: Board, frame: BinaryFrame) -> Ints:
     """Steps of the counter between frames that follow each other."""
     if board.counter is None:
         return np.empty(0, dtype=np.int64)
     (values,) = _read(buffer, places, frame, columns_of(frame, [board.counter.field]))
     steps = np.mod(np.diff(values.astype(np.int64)), board.counter.modulus)
-    return steps[np.diff(places) == frame.length]
+    whole: Ints = steps[np.diff(places) == frame.length]
+    return whole
 
 
 def _in_step(buffer: np.ndarray, places: np.ndarray, board: Board, frame: BinaryFrame) -> float:
@@ -316,5 +319,5 @@ def _roughness(buffer: np.ndarray, places: np.ndarray, board: Board, frame: Bina
     return float(np.median(medians))
 
 
-def _read(buffer: np.ndarray, places: np.ndarray, frame: BinaryFrame, columns: list[FrameColumn]) -> list[np.ndarray]:
+def _read(buffer: Ints, places: Ints, frame: BinaryFrame, columns: list[FrameColumn]) -> list[np.ndarray]:
     return engines.get("reference").frames.read_columns(buffer, places, frame.length, columns)

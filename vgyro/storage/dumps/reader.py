@@ -112,7 +112,7 @@ class DumpReader:
                 first, last = (start, stop) if hole is None else (hole.first, hole.last)
                 cause = self._cause(first, last, damage, borders)
                 estimate = self._time is None and row == 0
-                self._note_damage(first, last, lost, cause, borders, estimate, hole.lines if hole else None)
+                self._note_damage((first, last), lost, cause, borders, estimate, hole.lines if hole else None)
             if jump:
                 last = timed.time.item(jump.row - 1) if jump.row else self._time or 0.0
                 due = last + 1 / self.rate_hz
@@ -128,12 +128,13 @@ class DumpReader:
             if tail.broken_off and tail.stop - tail.start < 2 * self._length:
                 cause = "truncated at the end"
             self._cut_line = tail.start if tail.lines == 1 and tail.broken_off else None
-            self._note_damage(tail.start, tail.stop, 0, cause, borders, estimate=True, lines=tail.lines)
+            self._note_damage((tail.start, tail.stop), 0, cause, borders, estimate=True, lines=tail.lines)
 
     def _note_damage(
-        self, start: int, stop: int, lost: int, cause: str, borders: list[int], estimate: bool, lines: int | None = None
+        self, span: tuple[int, int], lost: int, cause: str, borders: list[int], estimate: bool, lines: int | None = None
     ) -> None:
         """Write damaged bytes down, a file at a time; the frames are lost in the file that holds most of the bytes."""
+        start, stop = span
         frames = max(int(cause in SEEN), round((stop - start) / self._length)) if lines is None else lines
         if cause != LEADING or stop - start > BOOT_BYTES:
             self._ledger.bad += frames

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Ints
 from vgyro.board import BinaryFrame, ByteOrder, Checksum
 from vgyro.engine.checksums import crc_tables, mask
 
@@ -135,16 +136,18 @@ def _constant(rows: np.ndarray, shape: Shape) -> int | None:
     return rest
 
 
-def _difference(rows: np.ndarray, shape: Shape) -> np.ndarray:
+def _difference(rows: Ints, shape: Shape) -> Ints:
     stored = _stored(rows, shape)
     covered = rows[:, shape.span[0] : shape.span[1]]
     if shape.family == "sum":
-        return (stored - covered.sum(axis=1, dtype=np.uint64)) & np.uint64(mask(shape.width))
+        difference: Ints = (stored - covered.sum(axis=1, dtype=np.uint64)) & np.uint64(mask(shape.width))
+        return difference
     tables = _tables(shape.width, shape.polynomial, shape.reflected, covered.shape[1], shape.pad_to)
     result = np.zeros(len(rows), tables.dtype)
     for place, table in enumerate(tables):
         result ^= table[covered[:, place]]
-    return result.astype(np.uint64) ^ stored
+    difference = result.astype(np.uint64) ^ stored
+    return difference
 
 
 def _count(rows: np.ndarray, shape: Shape, rest: int) -> int:

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vgyro import engine as engines
+from vgyro.arrays import Ints
 from vgyro.board import BinaryFrame, Board
 from vgyro.engine.frames import FrameColumn
 from vgyro.storage.dumps.selection import STRAY_FRAMES, CounterRule, breaks_of, last_alone, select, strays
@@ -28,11 +29,12 @@ class Content(NamedTuple):
     places: np.ndarray
     length: int
 
-    def rows(self) -> np.ndarray:
+    def rows(self) -> Ints:
         """uint8 [n, length]"""
         if not len(self.places):
             return np.empty((0, self.length), dtype=np.uint8)
-        return np.lib.stride_tricks.sliding_window_view(self.buffer, self.length)[self.places]
+        rows: Ints = np.lib.stride_tricks.sliding_window_view(self.buffer, self.length)[self.places]
+        return rows
 
 
 @dataclass
@@ -220,7 +222,7 @@ class BinaryScanner:
             breaks = self._breaks(places, counter)
         return self._found(places, counter, breaks)
 
-    def _breaks(self, places: np.ndarray, counter: np.ndarray | None) -> np.ndarray:
+    def _breaks(self, places: Ints, counter: Ints | None) -> Ints:
         step, modulus = (self._rule.step, self._rule.modulus) if self._rule else (0, 0)
         return self._kernels.breaks(places, self._length, counter, step, modulus)
 
@@ -253,12 +255,13 @@ class BinaryScanner:
             breaks,
         )
 
-    def _read(self, places: np.ndarray, columns: list[FrameColumn]) -> np.ndarray | None:
+    def _read(self, places: Ints, columns: list[FrameColumn]) -> Ints | None:
         """Counter or time stamp of frames, int64 [n]; None for a board without."""
         if not columns:
             return None
         (values,) = self._kernels.read_columns(self._buffer, places, self._length, columns)
-        return values.astype(np.int64)
+        counts: Ints = values.astype(np.int64)
+        return counts
 
     def _keep(self, keep_from: int) -> None:
         keep_from = max(keep_from, self._base)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Ints
+
 # Two frames further apart than this are not asked whether they are in step.
 LINK_FRAMES = 3
 STRAY_FRAMES = 64
@@ -126,13 +128,13 @@ def _links(
 
 
 def strays(
-    start: np.ndarray,
+    start: Ints,
     length: float,
-    counter: np.ndarray,
+    counter: Ints,
     rule: CounterRule,
-    rows: np.ndarray,
+    rows: Ints,
     previous: tuple[int, int] | None = None,
-) -> np.ndarray:
+) -> Ints:
     """Which of `rows` are candidates whose checksum holds by chance: they stand where their neighbours need another.
 
     start, counter : int64 [n], of chosen frames in order;  previous : start and counter of the frame before them

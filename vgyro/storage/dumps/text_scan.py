@@ -185,7 +185,12 @@ class TextScanner:
         return self._frames({name: column[good] for name, column in values.items()}, start, stop, damage, holes)
 
     def _frames(
-        self, values: dict[str, np.ndarray], start: np.ndarray, stop: np.ndarray, damage: np.ndarray, holes: dict
+        self,
+        values: dict[str, np.ndarray],
+        start: np.ndarray,
+        stop: np.ndarray,
+        damage: np.ndarray,
+        holes: dict[int, Hole],
     ) -> FoundFrames:
         raw = np.column_stack([column.astype(np.float64) for column in values.values()])
         content = Content(raw.reshape(-1).view(np.uint8), np.arange(len(raw)) * raw.strides[0], raw.strides[0])

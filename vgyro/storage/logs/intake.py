@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from vgyro.arrays import Bools
 from vgyro.errors import DataError
 from vgyro.log import TO_DEG_S, Log, LogArray, LogTime, RateUnit
 from vgyro.storage.integrity import Ledger
@@ -83,9 +84,10 @@ class Intake:
         return same
 
 
-def _equal(values: np.ndarray, others: np.ndarray) -> np.ndarray:
+def _equal(values: np.ndarray, others: np.ndarray) -> Bools:
     equal = values == others
-    return equal | (np.isnan(values) & np.isnan(others)) if values.dtype.kind == "f" else equal
+    same: Bools = equal | (np.isnan(values) & np.isnan(others)) if values.dtype.kind == "f" else equal
+    return same
 
 
 def numbers(column: pa.Array) -> np.ndarray:
@@ -102,7 +104,8 @@ def numbers(column: pa.Array) -> np.ndarray:
         raise ValueError(f"a column of {kind} holds no numbers")
     if column.null_count and not pa.types.is_floating(column.type):
         column = column.cast(pa.float64(), safe=False)
-    return column.to_numpy(zero_copy_only=False)
+    found: np.ndarray = column.to_numpy(zero_copy_only=False)
+    return found
 
 
 def matches(column: pa.Array, value: int | float | str) -> pa.Array:

@@ -29,7 +29,8 @@ def _tlog(head: bytes) -> bool:
     if len(head) < 9 or head[8] not in (0xFD, 0xFE):
         return False
     (time,) = struct.unpack_from(">Q", head)
-    return YEARS_US[0] < time < YEARS_US[1]
+    stamped: bool = YEARS_US[0] < time < YEARS_US[1]
+    return stamped
 
 
 def _zip_holds(*names: bytes) -> Callable[[bytes], bool]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.log import RateUnit
 from vgyro.storage.logs.intake import TIME_UNITS
 from vgyro.storage.logs.names import (
@@ -247,13 +248,14 @@ def _whole(values: np.ndarray) -> bool:
     return bool(known.size and np.all(known == np.rint(known)))
 
 
-def noise_of(values: np.ndarray) -> float:
+def noise_of(values: Floats) -> float:
     """Noise of a sample, one sigma, by the steps from sample to sample; of coarse or held values by their r.m.s."""
     steps = np.abs(np.diff(values[np.isfinite(values)].astype(np.float64)))
     if not steps.size:
         return 0.0
     usual = float(np.median(steps)) / 0.6745
-    return (usual or float(np.sqrt(np.mean(steps**2)))) / np.sqrt(2.0)
+    noise: float = (usual or float(np.sqrt(np.mean(steps**2)))) / np.sqrt(2.0)
+    return noise
 
 
 def varies(values: np.ndarray) -> bool:

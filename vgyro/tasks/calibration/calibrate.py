@@ -149,7 +149,10 @@ def record_of(fit: ScaleFit, recording: str | None) -> dict[str, Any]:
     numbers = (
         "scale", "scale_low", "scale_high", "bias", "bias_low", "bias_high", "nonlinearity_ppm", "floor_ppm",
     )  # fmt: skip
-    columns = (fit.rate, fit.mean_count, fit.residual, fit.standard_error, fit.direction, fit.temperature)
+    points = fit.points
+    columns = (
+        points.rate, points.mean_count, points.residual, points.standard_error, points.direction, points.temperature,
+    )  # fmt: skip
     return {
         "source": fit.source,
         "recording": recording,

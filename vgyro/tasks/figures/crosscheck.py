@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.board import Board
 from vgyro.config import CrossCheckOptions, FusionOptions, MetricsOptions
 from vgyro.engine.independent import printed_filter, textbook_allan_deviation
@@ -15,7 +16,7 @@ from vgyro.fusion.design import information, q_for_bandwidth
 from vgyro.metrics import Sampling, allan_deviation, own_samples, without_outliers
 from vgyro.storage.tables import read_column, read_columns, read_metadata, read_rows, write_table
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.figures.crosscheck_rows import CrosscheckRow, columns_of, compare
+from vgyro.tasks.figures.crosscheck_rows import Check, CrosscheckRow, columns_of, compare
 from vgyro.tasks.figures.crosscheck_windows import window_rows
 from vgyro.tasks.fusion.array_inputs import in_motion
 from vgyro.tasks.fusion.noise_record import read_noise
@@ -63,15 +64,16 @@ def filter_rows(task: Task, gyros: list[str]) -> Iterator[CrosscheckRow]:
         theirs = printed_filter(rate, float(read_metadata(task.input("rates"))["rate_hz"]), R, q, tau)
         tolerance = FILTER_TOLERANCE * float(np.abs(rate).max())
         check = f"filter, worst of the first {len(rate)} samples"
-        yield compare(check, "filterpy, sample by sample", -1, name, ours, theirs, tolerance, "deg/s")
+        yield compare(Check(check, "filterpy, sample by sample", -1, name), ours, theirs, tolerance, "deg/s")
 
 
-def _first_samples(task: Task, gyros: list[str]) -> np.ndarray:
+def _first_samples(task: Task, gyros: list[str]) -> Floats:
     """Rates [T, N] of the beginning of the first stretch, deg/s."""
     if incomplete(task.input("rates"), gyros):
         file = read_array(task.input("rates"), gyros, task.option("axis"))
         here = file.segment[:FILTER_SAMPLES] == file.segment[0]
-        return file.rate[:FILTER_SAMPLES][here].astype(float)
+        first: Floats = file.rate[:FILTER_SAMPLES][here].astype(float)
+        return first
     found = read_rows(task.input("rates"), ["segment", *gyros], 0, FILTER_SAMPLES)
     here = found["segment"] == found["segment"][0]
     return np.column_stack([found[gyro][here] for gyro in gyros]).astype(float)
@@ -107,9 +109,12 @@ def allan_rows(task: Task, gyros: list[str], rng: np.random.Generator) -> Iterat
             else:
                 theirs = _by_other_engine(task, rate[~outliers], when.without(outliers), tau)
             yield compare(
-                f"Allan deviation, τ = {tau:.4g} s", DEFINITION if whole else LOSSES, -1, str(name), ours, theirs,
-                ALLAN_TOLERANCE * abs(ours), "deg/s",
-            )  # fmt: skip
+                Check(f"Allan deviation, τ = {tau:.4g} s", DEFINITION if whole else LOSSES, -1, str(name)),
+                ours,
+                theirs,
+                ALLAN_TOLERANCE * abs(ours),
+                "deg/s",
+            )
 
 
 def _by_other_engine(task: Task, rate: np.ndarray, sampling: Sampling, tau: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -24,38 +25,35 @@ class CrosscheckRow:
     passed: bool
 
 
+class Check(NamedTuple):
+    """What is compared, against what, in which window (-1: a whole recording), of which series."""
+
+    check: str
+    against: str
+    window: int
+    series: str
+
+
 def compare(
-    check: str,
-    against: str,
-    window: int,
-    series: str,
-    ours: np.ndarray | float,
-    theirs: np.ndarray | float,
-    tolerance: float,
-    unit: str,
+    about: Check, ours: np.ndarray | float, theirs: np.ndarray | float, tolerance: float, unit: str
 ) -> CrosscheckRow:
     """Compare two figures, or of two arrays the elements that differ most; a NaN on one side does not pass."""
     first, second = np.ravel(ours).astype(float), np.ravel(theirs).astype(float)
     distance = np.abs(first - second)
     worst = int(np.argmax(np.where(np.isnan(distance), np.inf, distance)))
-    return _row(check, against, window, series, (first[worst], second[worst]), tolerance, unit, two_sided=True)
+    return _row(about, (first[worst], second[worst]), tolerance, unit, two_sided=True)
 
 
-def compare_maximum(
-    check: str, against: str, window: int, series: str, ours: float, theirs: float, tolerance: float
-) -> CrosscheckRow:
+def compare_maximum(about: Check, ours: float, theirs: float, tolerance: float) -> CrosscheckRow:
     """Compare two maxima of one likelihood: ours may be greater, but not smaller by more than the tolerance."""
-    return _row(check, against, window, series, (ours, theirs), tolerance, "1", two_sided=False)
+    return _row(about, (ours, theirs), tolerance, "1", two_sided=False)
 
 
-def _row(
-    check: str, against: str, window: int, series: str, pair: tuple[float, float], tolerance: float, unit: str,
-    *, two_sided: bool,
-) -> CrosscheckRow:  # fmt: skip
+def _row(about: Check, pair: tuple[float, float], tolerance: float, unit: str, *, two_sided: bool) -> CrosscheckRow:
     ours, theirs = float(pair[0]), float(pair[1])
     difference = ours - theirs
     passed = bool(abs(difference) <= tolerance if two_sided else difference >= -tolerance)
-    return CrosscheckRow(check, against, window, series, ours, theirs, difference, tolerance, unit, passed)
+    return CrosscheckRow(*about, ours, theirs, difference, tolerance, unit, passed)
 
 
 def columns_of(rows: list[CrosscheckRow]) -> pa.Table:

@@ -13,11 +13,11 @@ import numpy as np
 from vgyro import engine as engines
 from vgyro.config import Definition, Mode
 from vgyro.engine.independent import nnls_weights
-from vgyro.engine.models import NOT_POSITIVE_DEFINITE, OUTLIER_DOMINATED
+from vgyro.engine.models import NOT_POSITIVE_DEFINITE, OUTLIER_DOMINATED, DccModel
 from vgyro.engine.recursions import correlation_target, dcc_log_likelihood, garch_log_likelihood, garch_variance
 from vgyro.storage.tables import read_rows
 from vgyro.tasks.common import Task
-from vgyro.tasks.figures.crosscheck_rows import CrosscheckRow, compare, compare_maximum
+from vgyro.tasks.figures.crosscheck_rows import Check, CrosscheckRow, compare, compare_maximum
 from vgyro.tasks.volatility import layout
 from vgyro.tasks.volatility.stored import ArraySeries, open_series, stored_model
 from vgyro.volatility.check import covariance_after, greatest_log_likelihood
@@ -94,16 +94,20 @@ def garch_rows(one: Fitted, number: int, r: np.ndarray) -> Iterator[CrosscheckRo
     ours = garch_log_likelihood(e, garch_variance(e, *(table[name][gyros] for name in names[:3])))
     check = f"GARCH log-likelihood as stored [{definition}], worst gyro"
     tolerance = STORED_TOLERANCE * len(r)
-    yield compare(check, NUMPY, number, "all gyros", table["log_likelihood"][gyros], ours, tolerance, "1")
+    yield compare(Check(check, NUMPY, number, "all gyros"), table["log_likelihood"][gyros], ours, tolerance, "1")
     theirs = engines.get(one.other).garch.fit_garch(e).log_likelihood
     for place, gyro in enumerate(gyros):
-        about = number, one.array.gyros[gyro], float(ours[place])
+        name, likelihood = one.array.gyros[gyro], float(ours[place])
         status = table["status"][gyro]
         check = f"GARCH log-likelihood [{definition}], {status}"
         # One sample that dominates makes a likelihood of spikes at the bounds, which no search climbs for certain.
         tolerance = np.inf if status == OUTLIER_DOMINATED else MAXIMUM_TOLERANCE * len(r)
-        yield compare_maximum(check, LIBRARIES[one.other]["garch"], *about, float(theirs[place]), tolerance)
-        yield compare_maximum(check, GRID, *about, greatest_log_likelihood(e[:, place]), tolerance)
+        yield compare_maximum(
+            Check(check, LIBRARIES[one.other]["garch"], number, name), likelihood, float(theirs[place]), tolerance
+        )
+        yield compare_maximum(
+            Check(check, GRID, number, name), likelihood, greatest_log_likelihood(e[:, place]), tolerance
+        )
 
 
 def dcc_rows(
@@ -120,13 +124,18 @@ def dcc_rows(
     ours = float(dcc_log_likelihood(z, a, b, correlation_target(z)).sum())
     check, definition = "DCC log-likelihood", one.array.definition
     yield compare(
-        f"{check} as stored [{definition}]", NUMPY, number, "array", stored["log_likelihood"][0], ours,
-        STORED_TOLERANCE * len(r), "1",
-    )  # fmt: skip
+        Check(f"{check} as stored [{definition}]", NUMPY, number, "array"),
+        stored["log_likelihood"][0],
+        ours,
+        STORED_TOLERANCE * len(r),
+        "1",
+    )
     yield compare_maximum(
-        f"{check} [{definition}], {status}", LIBRARIES[one.other]["dcc"], number, "array", ours,
-        theirs.log_likelihood, MAXIMUM_TOLERANCE * len(r),
-    )  # fmt: skip
+        Check(f"{check} [{definition}], {status}", LIBRARIES[one.other]["dcc"], number, "array"),
+        ours,
+        theirs.log_likelihood,
+        MAXIMUM_TOLERANCE * len(r),
+    )
 
 
 def weight_rows(one: Fitted, number: int, model: WindowModels) -> Iterator[CrosscheckRow]:
@@ -147,7 +156,7 @@ def weight_rows(one: Fitted, number: int, model: WindowModels) -> Iterator[Cross
             series = f"{correlation}_{mode}[{array.definition}]"
             check = f"weights, worst of {len(ours)} samples"
             against = LIBRARIES[one.other]["weights"]
-            yield compare(check, against, number, series, ours, theirs.weights, WEIGHT_TOLERANCE, "1")
+            yield compare(Check(check, against, number, series), ours, theirs.weights, WEIGHT_TOLERANCE, "1")
 
 
 def loop_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels) -> Iterator[CrosscheckRow]:
@@ -158,7 +167,7 @@ def loop_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels) -> I
     target, stretch_stop = model.target[0][np.ix_(gyros, gyros)], int(array.plan.stretch_stop[number])
     for correlation in array.options.models:
         a, b = (float(model.a[0]), float(model.b[0])) if correlation == "dcc" else (0.0, 0.0)
-        last, following = covariance_after(r[:, gyros], omega, alpha, beta, a, b, target)
+        last, following = covariance_after(r[:, gyros], DccModel(omega, alpha, beta, a, b, target))
         places: dict[Mode, tuple[int, np.ndarray]] = {
             "in_sample": (window.stop - 1, last), "causal": (window.stop, following)
         }  # fmt: skip
@@ -172,7 +181,7 @@ def loop_rows(one: Fitted, number: int, r: np.ndarray, model: WindowModels) -> I
             theirs = np.zeros(len(gyros))
             theirs[gyros] = nnls_weights(H)
             series = f"{correlation}_{mode}[{array.definition}]"
-            yield compare("weights, worst gyro", LOOPS, number, series, ours[0], theirs, WEIGHT_TOLERANCE, "1")
+            yield compare(Check("weights, worst gyro", LOOPS, number, series), ours[0], theirs, WEIGHT_TOLERANCE, "1")
 
 
 def stored_weights(one: Fitted, model: str, mode: str, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:

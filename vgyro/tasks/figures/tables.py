@@ -119,7 +119,7 @@ def metric_columns(task: Task, found: list[FigureRows]) -> dict[str, np.ndarray]
     return {name: np.array(column, dtype=float if name in NUMBERS else str) for name, column in columns.items()}
 
 
-def correlation_columns(gyros: list[str], correlation: Correlation) -> dict[str, list]:
+def correlation_columns(gyros: list[str], correlation: Correlation) -> dict[str, list[str] | list[float]]:
     """correlation.parquet: one row a pair, both ways, and the diagonal."""
     places = [(row, column) for row in range(len(gyros)) for column in range(len(gyros))]
     return {

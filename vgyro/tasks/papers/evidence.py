@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -15,7 +15,7 @@ from vgyro.config import MetricsOptions, VolatilityOptions
 from vgyro.dataset import ConstantReference, Manifest
 from vgyro.papers import PaperEvidence, with_single
 from vgyro.papers.beside import CASE_RATE
-from vgyro.papers.series import Name, extremes, paired_ratios, series_figures
+from vgyro.papers.series import Name, SlowSeries, extremes, paired_ratios, series_figures
 from vgyro.storage.tables import read_columns, read_metadata
 from vgyro.tasks.figures.measure import fused_series
 from vgyro.tasks.rates.rates_file import read_array
@@ -39,20 +39,28 @@ AGAINST = {
 }
 
 
+class Wanted(NamedTuple):
+    """What a paper's tables ask for.
+
+    slow_series : whether the figures of the block means are wanted (L, Table 3)
+    rivals      : methods of the paper's that ours are compared with
+    """
+
+    slow_series: bool
+    rivals: Sequence[Name] = ()
+
+
 def gather(
     paths: Sequence[Path],
     manifest: Manifest,
     board: Board,
     volatility: VolatilityOptions,
     metrics: MetricsOptions,
-    slow_series: bool,
-    rivals: Sequence[Name] = (),
+    wanted: Wanted,
 ) -> PaperEvidence:
     """Evidence of one twin from all its artefacts.
 
     paths : files under …/<recording>/[<axis>/[<definition>/]]<table>.parquet; tables that no cell needs are passed over
-    slow_series : whether the figures of the block means are wanted (L, Table 3)
-    rivals : methods of the paper's that ours are compared with
     """
     gyros = [gyro.name for gyro in board.array(board.axes[0])]
     rows: dict[str, Rows] = {}
@@ -64,8 +72,8 @@ def gather(
         still = [row for row in rows["metrics"] if row[CASE_RATE] == 0]
         rows[f"metrics{MOVED}"] = at_added_rate(rows["metrics"], manifest)
         rows["metrics"] = with_single(with_table_means(still, manifest), gyros)
-    for static in at_rest(paths, manifest) if slow_series else ():
-        for suffix, found in _slow_rows(static, gyros, volatility, metrics, rivals):
+    for static in at_rest(paths, manifest) if wanted.slow_series else ():
+        for suffix, found in _slow_rows(static, gyros, volatility, metrics, wanted.rivals):
             for name, part in found.items():
                 rows.setdefault(f"{name}{suffix}", []).extend(part)
     return PaperEvidence(rows, gyros)
@@ -83,7 +91,8 @@ def at_added_rate(rows: Rows, manifest: Manifest) -> Rows:
     return moved + [row for row in rows if moved and row[CASE_RATE] == 0 and _series(row) not in touched]
 
 
-def _series(row: dict[str, Any]) -> tuple[str, str, str, str]:
+def _series(row: dict[str, Any]) -> tuple[str, ...]:
+    """What tells a series from the others."""
     return row["recording"], row["axis"], row["method"], row["definition"]
 
 
@@ -96,12 +105,12 @@ def _slow_rows(
         rate = 0.0 if path is None else added_rate(path)
         if rate is None:
             continue
-        names, values, stretch, rate_hz = _block_series(fused, gyros, volatility, path)
-        figures = series_figures(place, names, len(gyros), values, stretch, rate_hz, metrics)
+        series = _block_series(fused, gyros, volatility, path)
+        figures = series_figures(place, series, len(gyros), metrics)
         over = {**AGAINST, **extremes(figures.metrics, gyros, gyros[FAULTY - 1])}
         over |= {f"{one[0]}[{one[1]}]": one for one in rivals if one not in AGAINST.values()}
-        there = {label: name for label, name in over.items() if name in names}
-        ratios = paired_ratios(place, names, values, stretch, rate_hz, there, metrics)
+        there = {label: name for label, name in over.items() if name in series.names}
+        ratios = paired_ratios(place, series, there, metrics)
         found = {"metrics_1hz": figures.metrics, "factors_1hz": figures.factors, "ratios_1hz": ratios}
         yield suffix, {name: [{**row, CASE_RATE: rate} for row in part] for name, part in found.items()}
 
@@ -197,8 +206,8 @@ def added_rate(moved: Path) -> float | None:
 
 def _block_series(
     fused: Path, gyros: list[str], volatility: VolatilityOptions, moved: Path | None = None
-) -> tuple[list[Name], np.ndarray, np.ndarray, float]:
-    """(method, definition) of each column, block means [M, S], stretch [M], rate: single gyros first, then methods.
+) -> SlowSeries:
+    """Block means of single gyros and methods.
 
     fused : …/<recording>/<axis>/fused.parquet, with methods.parquet beside it and rates.parquet one folder up
     moved : moved.parquet: the errors at an added rate, where a method has some there
@@ -219,4 +228,4 @@ def _block_series(
     singles = means(array.rate)
     virtual = [values_of(one.column) for one in methods]
     names = [(gyro, "") for gyro in gyros] + [(one.method, one.definition) for one in methods]
-    return names, np.hstack([singles.values, *virtual]), singles.stretch, singles.rate_hz
+    return SlowSeries(names, np.hstack([singles.values, *virtual]), singles.stretch, singles.rate_hz)

@@ -13,7 +13,7 @@ from vgyro.papers.implied_cells import implied_cells, implied_figures
 from vgyro.papers.published import Heading
 from vgyro.storage.tables import write_text
 from vgyro.tasks.common import Task, run_task
-from vgyro.tasks.papers.evidence import gather
+from vgyro.tasks.papers.evidence import Wanted, gather
 from vgyro.tasks.papers.page import paper_page
 from vgyro.tasks.papers.plots import figures
 
@@ -35,8 +35,10 @@ def main(task: Task) -> None:
         board,
         task.section("volatility", VolatilityOptions),
         task.section("metrics", MetricsOptions),
-        any(table.select.get("artefact") == "metrics_1hz" for table in paper.tables),
-        [name_of(rival) for table in paper.tables for rival in table.rivals()],
+        Wanted(
+            any(table.select.get("artefact") == "metrics_1hz" for table in paper.tables),
+            [name_of(rival) for table in paper.tables for rival in table.rivals()],
+        ),
     )
     implied = implied_cells(paper)
     comparisons = [compare(paper, table, evidence, implied) for table in paper.tables]

@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from vgyro.report import html
-from vgyro.report.plots import Axis, Curve, curve_plot
+from vgyro.report.plots import Axis, Curve, PlotFrame, PlotMarks, curve_plot
 from vgyro.storage.tables import read_columns
 
 OWN = {"recommended": "recommended (vgyro)", "recommended_unsmoothed": "recommended, not smoothed (vgyro)"}
@@ -62,9 +62,16 @@ def _allan(path: Path, gyros: Sequence[str], labels: dict[str, str]) -> Markup:
             )
         )  # fmt: skip
     return curve_plot(
-        "allan", "Allan deviation at rest", curves, Axis("averaging time, s", "log"), Axis("deviation, deg/s", "log"),
-        summary="at the full rate; overlapping, bars are 95 % limits", height=380,
-    )  # fmt: skip
+        PlotFrame(
+            "allan",
+            "Allan deviation at rest",
+            Axis("averaging time, s", "log"),
+            Axis("deviation, deg/s", "log"),
+            summary="at the full rate; overlapping, bars are 95 % limits",
+            height=380,
+        ),
+        curves,
+    )
 
 
 def _weights(path: Path) -> Markup:
@@ -79,6 +86,13 @@ def _weights(path: Path) -> Markup:
         for index, name in enumerate(names)
     ]
     return curve_plot(
-        "weights", "Weights of the gyroscopes", curves, Axis("time, s"), Axis("weight"),
-        summary="DCC, in sample, on the level, as the paper's figure 7", levels=(1.0 / max(len(names), 1),),
-    )  # fmt: skip
+        PlotFrame(
+            "weights",
+            "Weights of the gyroscopes",
+            Axis("time, s"),
+            Axis("weight"),
+            summary="DCC, in sample, on the level, as the paper's figure 7",
+        ),
+        curves,
+        PlotMarks(levels=(1.0 / max(len(names), 1),)),
+    )

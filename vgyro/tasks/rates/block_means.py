@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.board import Board, Temperature
 from vgyro.runs import run_starts
 from vgyro.storage.tables import read_batches
@@ -78,19 +79,19 @@ def _means(columns: dict[str, np.ndarray], starts: np.ndarray, names: list[str])
     return np.vstack([samples, *head, *(_mean(columns[name][:stop], starts[:-1], samples) for name in names)])
 
 
-def _mean(values: np.ndarray, begins: np.ndarray, samples: np.ndarray) -> np.ndarray:
+def _mean(values: Floats, begins: Ints, samples: Ints) -> Floats:
     """Means [M] of the values that are there in each block; NaN: none is, or one of them was clipped."""
     total, count = np.add.reduceat(values, begins), samples.astype(float)
     if np.isnan(total).any():
         there = ~np.isnan(values)
         total = np.add.reduceat(np.where(there, values, 0.0), begins)
         count = np.add.reduceat(there, begins, dtype=float)
-    mean = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    mean: Floats = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
     mean[np.isinf(mean)] = np.nan
     return mean
 
 
-def between(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+def between(time: Floats, values: Floats) -> Floats:
     """values [M] at time [M], s, with those that are NaN interpolated in time, and held at the ends; all NaN: as is."""
     there = np.isfinite(values)
     if there.all() or not there.any():

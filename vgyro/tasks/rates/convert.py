@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from vgyro.arrays import Floats
 from vgyro.board import Board, Gyro
 from vgyro.calibration import (
     Compensation,
@@ -263,7 +264,7 @@ def rest_of(converter: Converter, frames: Path, time: np.ndarray, rate_hz: float
     return np.full(time.size, recording.kind in AT_REST)
 
 
-def reference_of(converter: Converter, frames: Path, time: np.ndarray, logs: list[Path]) -> np.ndarray | None:
+def reference_of(converter: Converter, frames: Path, time: Floats, logs: list[Path]) -> Floats | None:
     """True rate [T], deg/s, about the recording's axis; NaN outside a log; None where it is not known."""
     reference = converter.recording.reference
     if isinstance(reference, ConstantReference):
@@ -280,7 +281,8 @@ def reference_of(converter: Converter, frames: Path, time: np.ndarray, logs: lis
         return sinusoid(time, reference.amplitude, reference.frequency_hz, phase)
     if isinstance(reference, FileReference) and logs:
         logged, rate = read_reference(logs[0], reference)
-        return np.interp(time, logged, rate, left=np.nan, right=np.nan)
+        true: Floats = np.interp(time, logged, rate, left=np.nan, right=np.nan)
+        return true
     return None
 
 

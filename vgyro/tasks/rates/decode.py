@@ -12,7 +12,7 @@ from vgyro.config import IntegrityOptions
 from vgyro.dataset import Manifest, Recording, values_of
 from vgyro.errors import DataError
 from vgyro.log import Values
-from vgyro.storage.decode import open_recording
+from vgyro.storage.decode import ReaderOptions, open_recording
 from vgyro.storage.frames import Frames, Reader, empty_frames
 from vgyro.storage.integrity import Integrity, Refused
 from vgyro.storage.tables import Provenance, TableWriter, write_json, write_table
@@ -36,7 +36,12 @@ def main(task: Task) -> None:
     provenance = _provenance(task)
     try:
         reader = open_recording(
-            task.inputs["files"], recording, board, options, engine=task.engine, array=manifest.array
+            task.inputs["files"],
+            recording,
+            board,
+            options,
+            array=manifest.array,
+            reading=ReaderOptions(engine=task.engine),
         )
         record = decode(reader, task.output("frames"), provenance, _extra(board, values))
         for reason in record.reasons:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
+from vgyro.arrays import Ints
 from vgyro.engine.models import DCC_STATUSES, GARCH_STATUSES
 from vgyro.tasks.volatility.layout import WHOLE
 from vgyro.tasks.volatility.stored import ArraySeries
@@ -66,8 +67,9 @@ def time_of(array: ArraySeries) -> tuple[float, float]:
     return float(first), float(last) + 1 / array.rate_hz
 
 
-def codes_of(table: pa.Table, name: str, names: list[str] | tuple[str, ...]) -> np.ndarray:
+def codes_of(table: pa.Table, name: str, names: list[str] | tuple[str, ...]) -> Ints:
     """A dictionary-encoded column as places in `names`."""
     column = table.column(name).combine_chunks()
     places = np.array([names.index(word) for word in column.dictionary.to_pylist()], dtype=np.int64)
-    return places[column.indices.to_numpy()]
+    codes: Ints = places[column.indices.to_numpy()]
+    return codes

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vgyro.volatility.effects.kinds import (
-    FEWEST_SAMPLES,
     LEVEL_LEVEL,
     LONG_LAGS,
     MODEL_LEVEL,
@@ -22,6 +21,7 @@ from vgyro.volatility.effects.kinds import (
     SeenTone,
     gather_evidence,
 )
+from vgyro.volatility.effects.whiten import FEWEST_SAMPLES
 
 NOTHING = "nothing"
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats
 from vgyro.volatility.arch_lm import FLAT
 
 FEWEST_SAMPLES = 50
@@ -80,20 +81,20 @@ def whiten(series: np.ndarray, rate_hz: float, span: int) -> Whitened:
     return Whitened(residual, quiet, drift, tones, lines, autoregression, disturbed)
 
 
-def running_median(series: np.ndarray, span: int) -> np.ndarray:
+def running_median(series: Floats, span: int) -> Floats:
     """Median over `span` samples about each sample, made odd and no more than there are; straight at both ends."""
     from scipy.ndimage import median_filter
 
     samples = len(series)
     half = min(span // 2, (samples - 1) // 2)
-    median = median_filter(series, 2 * half + 1, mode="nearest")
+    median: Floats = median_filter(series, 2 * half + 1, mode="nearest")
     place = np.arange(half + 1)
     median[: half + 1] = median[half] - _slope(series[: 2 * half + 1]) * place[::-1]
     median[samples - half - 1 :] = median[samples - half - 1] + _slope(series[samples - 2 * half - 1 :]) * place
     return median
 
 
-def far_off(rest: np.ndarray) -> np.ndarray:
+def far_off(rest: Floats) -> Bools:
     """True for the samples of a series about zero [T] that are too far off for Gaussian noise of its usual size."""
     from scipy.special import ndtri
 
@@ -212,16 +213,17 @@ def _base(frequency: float, time: np.ndarray) -> np.ndarray:
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _least_squares(base: np.ndarray, series: np.ndarray) -> np.ndarray:
+def _least_squares(base: Floats, series: Floats) -> Floats:
     """At half the sample rate one column of the base is zero: its weight, too."""
     return np.linalg.lstsq(base, series, rcond=1e-6)[0]
 
 
-def _innovations(series: np.ndarray, autoregression: np.ndarray) -> np.ndarray:
+def _innovations(series: Floats, autoregression: Floats) -> Floats:
     """What an autoregression leaves of a series; what lies before its first sample counts as zero."""
     from scipy.signal import lfilter
 
-    return lfilter(np.concatenate([[1.0], -autoregression]), [1.0], series)
+    innovations: Floats = lfilter(np.concatenate([[1.0], -autoregression]), [1.0], series)
+    return innovations
 
 
 def _slope(series: np.ndarray) -> float:

@@ -43,7 +43,8 @@ def of_the_array(one: SuspectedFault, parts: Sequence[Slow]) -> bool:
     settles = one.kind == "drift" and one.first - int(np.argmax(run)) < EARLY * run.sum()
     if settles:
         return float(np.mean(np.square(sizes))) > SETTLES**2
-    return spread(np.array(sizes)) ** 2 - one.evidence**-2.0 > LIKE**2
+    alike: bool = spread(np.array(sizes)) ** 2 - one.evidence**-2.0 > LIKE**2
+    return alike
 
 
 def _form(own: Slow, first: int, last: int, run: np.ndarray) -> np.ndarray:

@@ -100,10 +100,10 @@ def _passing(
     if back is not None and (forward is None or back < forward):
         begun = _onset(slow, change.first - back, change.first, low)
         level, rise = change.level + change.size, begun.last - begun.first
-        return _candidate(slow, gyro, begun.first, change.last, level, evidence, rise <= longest_step)
+        return _candidate(slow, gyro, (begun.first, change.last), level, evidence, rise <= longest_step)
     assert forward is not None
     step = change.last - change.first <= longest_step
-    return _candidate(slow, gyro, change.first, change.last + forward, change.level, evidence, step)
+    return _candidate(slow, gyro, (change.first, change.last + forward), change.level, evidence, step)
 
 
 def _lasting(slow: Slow, gyro: int, change: LevelChange, evidence: float, longest_step: int) -> list[SuspectedFault]:
@@ -113,8 +113,8 @@ def _lasting(slow: Slow, gyro: int, change: LevelChange, evidence: float, longes
     """
     low, high = run_of(slow, change.first)
     step = change.last - change.first <= longest_step
-    begins = _candidate(slow, gyro, change.first, high, change.level, evidence, step)
-    ends = _candidate(slow, gyro, low, change.last, change.level + change.size, evidence, step)
+    begins = _candidate(slow, gyro, (change.first, high), change.level, evidence, step)
+    ends = _candidate(slow, gyro, (low, change.last), change.level + change.size, evidence, step)
     reached = (change.last - low) / (high - low)
     if reached < EARLY:
         return [ends]
@@ -122,9 +122,10 @@ def _lasting(slow: Slow, gyro: int, change: LevelChange, evidence: float, longes
 
 
 def _candidate(
-    slow: Slow, gyro: int, first: int, last: int, level: float, evidence: float, step: bool
-) -> SuspectedFault:  # fmt: skip
-    last = max(last, first + 1)
+    slow: Slow, gyro: int, blocks: tuple[int, int], level: float, evidence: float, step: bool
+) -> SuspectedFault:
+    """A fault from a block to one before another."""
+    first, last = blocks[0], max(blocks[1], blocks[0] + 1)
     kind: FaultKind = "step" if step else "drift"
     return SuspectedFault(gyro, kind, first, last, evidence, _size(slow.mean[first:last] - level), "deg/s")
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.faults.levels.drift_variance import Slow
 from vgyro.fusion.faults.levels.health import covariances
 
@@ -161,10 +162,11 @@ def _best_ramp(inverse: np.ndarray, mean: np.ndarray, ramp: np.ndarray) -> tuple
     return best, float(along[best] / power[best]) if seen[best] else 0.0, float(evidence[best])
 
 
-def _ramp(points: int, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+def _ramp(points: int, begin: Ints, end: Ints) -> Floats:
     """Ramps from 0 at `begin` to 1 at `end` [R, n] in the middles of the points."""
     middle = np.arange(points) + 0.5
-    return np.clip((middle - begin[:, None]) / np.maximum(end - begin, 1e-9)[:, None], 0.0, 1.0)
+    ramps: Floats = np.clip((middle - begin[:, None]) / np.maximum(end - begin, 1e-9)[:, None], 0.0, 1.0)
+    return ramps
 
 
 @lru_cache(maxsize=4)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.faults.candidate import running_sum, spread
 from vgyro.fusion.faults.residuals import Residuals
 from vgyro.runs import run_starts, true_runs
@@ -46,7 +47,7 @@ class Slow:
         return float(np.median(self.white))
 
 
-def local_variance(found: Residuals, gyro: int) -> np.ndarray:
+def local_variance(found: Residuals, gyro: int) -> Floats:
     """Variance of a sample of the residual in and around each block [B]: the greater one of the two, for bursts."""
     variance = np.where(np.isfinite(found.variance[:, gyro]), found.variance[:, gyro], found.expected[:, gyro])
     # A gyro that gives one value alone has noise all the same: that of its converter.
@@ -54,7 +55,8 @@ def local_variance(found: Residuals, gyro: int) -> np.ndarray:
     sums = running_sum(variance)
     blocks = np.arange(len(variance))
     low, high = np.maximum(blocks - NEARBY, 0), np.minimum(blocks + NEARBY + 1, len(variance))
-    return np.maximum((sums[high] - sums[low]) / (high - low), variance)
+    local: Floats = np.maximum((sums[high] - sums[low]) / (high - low), variance)
+    return local
 
 
 def slow_part(found: Residuals, gyro: int, counts: np.ndarray, run: np.ndarray, mean: np.ndarray) -> Slow:

@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.faults.candidate import lengths_up_to
 from vgyro.fusion.faults.levels.drift_variance import Slow
 from vgyro.runs import runs
@@ -55,7 +56,7 @@ class DriftGrid:
     log_prior: np.ndarray
     power: np.ndarray
 
-    def log_likelihood(self, mean: np.ndarray, size: float) -> np.ndarray:
+    def log_likelihood(self, mean: Floats, size: float) -> Floats:
         """Log likelihood [G] of the points, with one change of level or none.
 
         mean : [n], means in units of the root of their usual white variance;  size : s.d. of a change, in the same
@@ -67,7 +68,8 @@ class DriftGrid:
         prior = size**-2.0
         gain = 0.5 * along**2 / (self.power + prior) - 0.5 * np.log1p(self.power * size**2)
         changed = np.logaddexp.reduce(gain + self.log_prior, axis=1)
-        return steady + np.logaddexp(np.log1p(-CHANGED), np.log(CHANGED) + changed)
+        likelihood: Floats = steady + np.logaddexp(np.log1p(-CHANGED), np.log(CHANGED) + changed)
+        return likelihood
 
 
 def covariances(points: int) -> tuple[np.ndarray, np.ndarray]:
@@ -206,9 +208,10 @@ def healthy_array(parts: Sequence[Slow]) -> list[Slow]:
     return found
 
 
-def _mean(probability: np.ndarray, variance: np.ndarray) -> float:
+def _mean(probability: Floats, variance: Floats) -> float:
     """Power mean between the mean and that of the logarithm, as the posterior is wide."""
-    return float(probability @ variance**POWER) ** (1.0 / POWER)
+    mean: float = float(probability @ variance**POWER) ** (1.0 / POWER)
+    return mean
 
 
 def _centres(axes: Sequence[np.ndarray]) -> np.ndarray:
@@ -216,8 +219,9 @@ def _centres(axes: Sequence[np.ndarray]) -> np.ndarray:
     return np.linspace(low, high, 2 * len(axes[0]))
 
 
-def _near(centres: np.ndarray, own: np.ndarray) -> np.ndarray:
+def _near(centres: Floats, own: Floats) -> Floats:
     """Probabilities of the values `own` [V] for every spread and centre [S·C, V]."""
     log = -0.5 * ((own - centres[:, None]) / LIKENESS[:, None, None]) ** 2
     weight = np.exp(log - log.max(axis=2, keepdims=True))
-    return (weight / weight.sum(axis=2, keepdims=True)).reshape(-1, len(own))
+    near: Floats = (weight / weight.sum(axis=2, keepdims=True)).reshape(-1, len(own))
+    return near

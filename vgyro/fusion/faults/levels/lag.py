@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats, Ints
 from vgyro.fusion.faults.candidate import weighted_median
 
 FEWEST_BLOCKS = 32
@@ -11,7 +12,7 @@ LEAST_GAIN = 0.02
 """Share of the mean size of the changes that the delay must explain."""
 
 
-def without_lag(mean: np.ndarray, motion: np.ndarray, counts: np.ndarray, run: np.ndarray) -> np.ndarray:
+def without_lag(mean: Floats, motion: Floats, counts: Bools, run: Ints) -> Floats:
     """Residual means [B], deg/s, less their slope times how fast the motion [B], deg/s, changes about the block.
 
     counts [B] : healthy blocks in motion, which the slope is taken from;  run [B] : no change reaches over its ends

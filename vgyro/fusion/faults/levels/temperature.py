@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vgyro.arrays import Bools, Floats, Ints
 from vgyro.fusion.faults.candidate import running_sum, weighted_median
 
 SMOOTH = 15  # blocks on each side
@@ -14,7 +15,7 @@ LEAST_GAIN = 0.02
 """Share of the mean size of the changes that the temperature must explain."""
 
 
-def block_temperature(temperature: np.ndarray | None, edges: np.ndarray) -> np.ndarray | None:
+def block_temperature(temperature: Floats | None, edges: Ints) -> Floats | None:
     """Temperature of the blocks [B], °C, smoothed against the noise of the thermometer; None where none is known.
 
     temperature : [T] of the samples;  edges : [B + 1] samples
@@ -26,12 +27,11 @@ def block_temperature(temperature: np.ndarray | None, edges: np.ndarray) -> np.n
         return None
     sums, places = running_sum(means), np.arange(len(means))
     half = np.minimum(np.minimum(places, len(means) - 1 - places), SMOOTH)
-    return (sums[places + half + 1] - sums[places - half]) / (2 * half + 1)
+    smoothed: Floats = (sums[places + half + 1] - sums[places - half]) / (2 * half + 1)
+    return smoothed
 
 
-def without_temperature(
-    mean: np.ndarray, temperature: np.ndarray | None, healthy: np.ndarray, run: np.ndarray
-) -> np.ndarray:
+def without_temperature(mean: Floats, temperature: Floats | None, healthy: Bools, run: Ints) -> Floats:
     """Residual means [B], deg/s, less their slope times the temperature [B], °C.
 
     The slope is the weighted median of change over change from one stretch of blocks to the next, so that a fault of
@@ -54,4 +54,5 @@ def without_temperature(
     slope = weighted_median(change[warms] / warming[warms], np.abs(warming[warms]))
     if np.abs(change - slope * warming).sum() > (1.0 - LEAST_GAIN) * np.abs(change).sum():
         return mean
-    return mean - slope * (temperature - temperature[0])
+    without: Floats = mean - slope * (temperature - temperature[0])
+    return without

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.faults.candidate import spread
 from vgyro.fusion.types import ArrayRates
@@ -82,7 +83,7 @@ def _medians(values: np.ndarray) -> np.ndarray:
     return np.where(empty, 0.0, np.nanmedian(np.where(empty, 0.0, values), axis=-1, keepdims=True))
 
 
-def _limit(size: np.ndarray, chances: int, floor: float) -> float:
+def _limit(size: Floats, chances: int, floor: float) -> float:
     """Distance that no sample of the recording reaches by chance, deg/s."""
     limits = []
     for share in TAILS:
@@ -92,7 +93,8 @@ def _limit(size: np.ndarray, chances: int, floor: float) -> float:
             return math.inf
         exponent = min(math.log(FURTHER) / max(math.log(far / near), 1e-9), THINNEST)
         limits.append(near * (share * chances / ODDS) ** (1.0 / exponent))
-    return min(limits)
+    limit: float = min(limits)
+    return limit
 
 
 def _joined(places: np.ndarray) -> list[tuple[int, int]]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from vgyro.arrays import Floats, Ints
 from vgyro.fusion.events import FaultEvent
 from vgyro.fusion.samples.clipped import clipped
 from vgyro.fusion.types import ArrayRates
@@ -46,10 +47,11 @@ def _ends(column: np.ndarray, at_end: np.ndarray) -> Iterator[float]:
         yield from sorted({float(one) for one in (column[at_end].min(), column[at_end].max())})
 
 
-def _others(array: ArrayRates, gyro: int, rows: np.ndarray) -> np.ndarray:
+def _others(array: ArrayRates, gyro: int, rows: Ints) -> Floats:
     """Median of the other gyros in some samples; the gyro itself if it is alone."""
     others = np.delete(np.arange(array.rate.shape[1]), gyro)
-    return np.median(array.rate[rows][:, others if len(others) else [gyro]].astype(float), axis=1)
+    median: Floats = np.median(array.rate[rows][:, others if len(others) else [gyro]].astype(float), axis=1)
+    return median
 
 
 def _event(gyro: int, column: np.ndarray, at_end: np.ndarray) -> FaultEvent:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vgyro.arrays import Floats
 from vgyro.fusion.events import FaultEvent, FaultKind
 from vgyro.fusion.samples.quantised import steps
 from vgyro.fusion.types import ArrayRates
@@ -85,7 +86,7 @@ def _usual_difference(column: np.ndarray) -> float:
     return float(np.median(some)) if some.size else 0.0
 
 
-def _some_differences(column: np.ndarray, step: int) -> np.ndarray:
+def _some_differences(column: Floats, step: int) -> Floats:
     places = np.arange(0, len(column) - 1, step)
     return np.abs(column[places + 1].astype(float) - column[places])
 

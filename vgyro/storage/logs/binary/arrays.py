@@ -92,7 +92,16 @@ def _table(name: str, variables: Sequence[Variable], path: Path) -> tuple[LogTab
     return LogTable(name, tuple(leaf.column for leaf in leaves), variables[0].shape[0]), leaves
 
 
-def _spread(name: str, dtype: np.dtype, inner: tuple[int, ...]) -> Iterator[tuple[str, Kind, str, Take]]:
+class _Found(NamedTuple):
+    """A column: its name, kind and unit, and how it is taken."""
+
+    name: str
+    kind: Kind
+    unit: str
+    take: Take
+
+
+def _spread(name: str, dtype: np.dtype, inner: tuple[int, ...]) -> Iterator[_Found]:
     """The columns of blocks [n, *inner]: name, name[0] …, name.field; those of an array without a name: c1, c2, …"""
     if len(inner) > 1:
         return
@@ -101,16 +110,17 @@ def _spread(name: str, dtype: np.dtype, inner: tuple[int, ...]) -> Iterator[tupl
             kind, *_ = dtype.fields[part]  # type: ignore[index]
             shape = kind.shape
             for found, value, unit, take in _spread(f"{name}.{part}" if name else part, kind.base, shape):
-                yield found, value, unit, partial(_within, part, take)
+                yield _Found(found, value, unit, partial(_within, part, take))
         return
     if dtype.kind not in "biufMmSU":
         return
     kind_of: Kind = "date" if dtype.kind == "M" else "text" if dtype.kind in "SU" else "number"
     unit = "ns" if dtype.kind == "m" else ""
     if not inner:
-        yield name or "c1", kind_of, unit, lambda block: block
+        yield _Found(name or "c1", kind_of, unit, lambda block: block)
     for index in range(inner[0] if inner else 0):
-        yield f"{name}[{index}]" if name else f"c{index + 1}", kind_of, unit, partial(_column, index)
+        label = f"{name}[{index}]" if name else f"c{index + 1}"
+        yield _Found(label, kind_of, unit, partial(_column, index))
 
 
 def _within(part: str, take: Take, block: np.ndarray) -> np.ndarray:

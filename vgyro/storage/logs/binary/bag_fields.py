@@ -78,9 +78,26 @@ def has_sequences(msgtype: str, fields: Fields, depth: int = 0) -> bool:
     return False
 
 
-def _walk(
-    msgtype: str, fields: Fields, prefix: str, example: Any, unit: str, depth: int
-) -> Iterator[tuple[str, Kind, str, Take, pa.DataType]]:
+class _Found(NamedTuple):
+    """A column: its name, kind and unit, how it is taken from a message, and its Arrow type."""
+
+    name: str
+    kind: Kind
+    unit: str
+    take: Take
+    type: pa.DataType
+
+
+class _Place(NamedTuple):
+    """Where a value stands in a message: its name, how it is taken, the unit above it, how deep it lies."""
+
+    path: str
+    take: Take
+    unit: str
+    depth: int
+
+
+def _walk(msgtype: str, fields: Fields, prefix: str, example: Any, unit: str, depth: int) -> Iterator[_Found]:
     if depth > DEEPEST:
         raise Damaged(f"message types nested more than {DEEPEST} deep")
     for name, (node, inner) in fields[msgtype][1]:
@@ -91,28 +108,27 @@ def _walk(
         below = getattr(example, attribute, None)
         if node in (BASE, NAME):
             single = (node, inner)
-            yield from _item(single, fields, path, below, said, _attribute(attribute), depth)
+            yield from _item(single, fields, _Place(path, _attribute(attribute), said, depth), below)
             continue
         length = inner[1] if node == ARRAY else len(below) if below is not None else 0
         for index in range(length if length <= LONGEST else 0):
             one = below[index] if below is not None and index < len(below) else None
-            yield from _item(inner[0], fields, f"{path}[{index}]", one, said, _element(attribute, index), depth)
+            place = _Place(f"{path}[{index}]", _element(attribute, index), said, depth)
+            yield from _item(inner[0], fields, place, one)
 
 
-def _item(
-    desc: tuple[int, Any], fields: Fields, path: str, example: Any, unit: str, take: Take, depth: int
-) -> Iterator[tuple[str, Kind, str, Take, pa.DataType]]:
-    node, inner = desc
+def _item(desc: tuple[int, Any], fields: Fields, place: _Place, example: Any) -> Iterator[_Found]:
+    (node, inner), (path, take, unit, depth) = desc, place
     if node == BASE:
         if (type_ := TYPES.get(inner[0])) is not None:
-            yield path, "text" if type_ == pa.string() else "number", unit, take, type_
+            yield _Found(path, "text" if type_ == pa.string() else "number", unit, take, type_)
     elif inner == TIME:
-        yield path, "date", "", _then(take, _ns), pa.int64()
+        yield _Found(path, "date", "", _then(take, _ns), pa.int64())
     elif inner == DURATION:
-        yield path, "number", "ns", _then(take, _ns), pa.int64()
+        yield _Found(path, "number", "ns", _then(take, _ns), pa.int64())
     else:
         for name, kind, said, deeper, type_ in _walk(inner, fields, f"{path}.", example, unit, depth + 1):
-            yield name, kind, said, _then(take, deeper), type_
+            yield _Found(name, kind, said, _then(take, deeper), type_)
 
 
 def _attribute(name: str) -> Take:
@@ -136,4 +152,5 @@ def _then(first: Take, second: Take) -> Take:
 
 
 def _ns(stamp: Any) -> int:
-    return stamp.sec * 10**9 + stamp.nanosec
+    ns: int = stamp.sec * 10**9 + stamp.nanosec
+    return ns

@@ -69,7 +69,8 @@ def _first_row(file: Any, schema: pa.Schema) -> pa.RecordBatch | None:
 
 
 def _is_list(kind: pa.DataType) -> bool:
-    return pa.types.is_list(kind) or pa.types.is_large_list(kind)
+    lists: bool = pa.types.is_list(kind) or pa.types.is_large_list(kind)
+    return lists
 
 
 def _leaves(schema: pa.Schema, first: pa.RecordBatch | None, path: Path) -> list[ParquetLeaf]:
@@ -86,20 +87,29 @@ def _leaves(schema: pa.Schema, first: pa.RecordBatch | None, path: Path) -> list
     return leaves
 
 
-def _spread(name: str, kind: pa.DataType, width: int) -> Iterator[tuple[str, Kind, str, Take]]:
+class _Found(NamedTuple):
+    """A column: its name, kind and unit, and how it is taken."""
+
+    name: str
+    kind: Kind
+    unit: str
+    take: Take
+
+
+def _spread(name: str, kind: pa.DataType, width: int) -> Iterator[_Found]:
     """The columns that one of the file makes."""
     if (found := _plain(kind)) is not None:
-        yield name, *found
+        yield _Found(name, *found)
     elif pa.types.is_fixed_size_list(kind) or _is_list(kind):
         fixed = kind.list_size if pa.types.is_fixed_size_list(kind) else width
         if (found := _plain(kind.value_type)) is not None:
             value, unit, inner = found
             for index in range(fixed):
-                yield f"{name}[{index}]", value, unit, _then(partial(_element, index), inner)
+                yield _Found(f"{name}[{index}]", value, unit, _then(partial(_element, index), inner))
     elif pa.types.is_struct(kind):
         for index, field in enumerate(kind):
             for inner_name, value, unit, inner in _spread(f"{name}.{field.name}", field.type, 0):
-                yield inner_name, value, unit, _then(partial(_field, index), inner)
+                yield _Found(inner_name, value, unit, _then(partial(_field, index), inner))
 
 
 def _field(index: int, array: pa.Array) -> pa.Array:

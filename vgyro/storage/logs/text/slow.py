@@ -148,7 +148,7 @@ class NamedReader:
 
     def rows(self, lines: Lines, damage: TextDamage, eol: bytes, start: int) -> Iterator[LogRows]:
         """All rows, with the damage among them."""
-        held: list[list] = []
+        held: list[list[Value]] = []
         place = 0
         for block in lines.blocks():
             damage.too_long(block.long)
@@ -169,7 +169,7 @@ class NamedReader:
         if rest.batch.num_rows or rest.bad:
             yield rest
 
-    def _row(self, line: int, raw: bytes, damage: TextDamage, last: bool) -> list | None:
+    def _row(self, line: int, raw: bytes, damage: TextDamage, last: bool) -> list[Value] | None:
         text = raw.decode(self._codec, "replace").strip()
         if not text:
             return None
@@ -208,7 +208,7 @@ class NamedReader:
             raise LineMisfit(f"expected {'a number' if kind in ('number', 'hex', 'integer') else 'a time'} as {name}")
         return found
 
-    def _given(self, held: list[list], place: int, damage: TextDamage) -> LogRows:
+    def _given(self, held: list[list[Value]], place: int, damage: TextDamage) -> LogRows:
         arrays = []
         for at, name in enumerate(self._columns):
             kind = self._form.kinds[name][0]
