@@ -68,8 +68,8 @@ class GyroTruth(StrictModel):
     def arw(self) -> float:
         """Angle random walk, deg/√h, given or implied by omega."""
         if self.garch is not None and self.garch.omega is not None:
-            deviation: float = arw_deg_rt_h((self.garch.omega / (1 - self.garch.alpha - self.garch.beta)) ** 0.5)
-            return deviation
+            found: float = arw_deg_rt_h((self.garch.omega / (1 - self.garch.alpha - self.garch.beta)) ** 0.5)
+            return found
         return self.arw_deg_rt_h or 0.0
 
     @model_validator(mode="after")

@@ -115,11 +115,8 @@ def known_weights(one: Case) -> tuple[np.ndarray, np.ndarray]:
 def oracle(one: Case) -> Smoothed:
     """Smoothed by one who knows the variance of every sample and the bias of every gyro; motion by likelihood."""
     z, r = known_weights(one)
-    rate_hz, segment = one.array.rate_hz, one.array.segment
-    return smooth(
-        NoisyRate(z, r, segment, rate_hz),
-        choose_motion(NoisyRate(z, r, segment, rate_hz), models=one.parameters.motion_models),
-    )
+    noisy = NoisyRate(z, r, one.array.segment, one.array.rate_hz)
+    return smooth(noisy, choose_motion(noisy, models=one.parameters.motion_models))
 
 
 def wiener_sd(one: Case, motion_sd: float, bandwidth_hz: float) -> float:

@@ -161,8 +161,8 @@ class BiasEvidence:
     @property
     def has_slopes(self) -> bool:
         """Temperature slopes are among the constants."""
-        has: bool = self.design.shape[2] > self.plain
-        return has
+        slopes: bool = self.design.shape[2] > self.plain
+        return slopes
 
     @cached_property
     def unseen(self) -> np.ndarray:

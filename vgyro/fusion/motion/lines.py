@@ -133,10 +133,10 @@ def sinusoid(pieces: list[SpectrumPiece], rate_hz: float, about_hz: float) -> tu
 
     def power(frequency: float) -> float:
         turn = 2.0 * math.pi * frequency / rate_hz
-        negative: float = -sum(
+        total: float = -sum(
             abs(_wave(turn * ROW, len(rows)) @ (rows @ _wave(turn, ROW))) ** 2 / size for rows, size in tables
         )
-        return negative
+        return total
 
     bounds = (about_hz - 1.2 * step, about_hz + 1.2 * step)
     found = float(minimize_scalar(power, bounds=bounds, method="bounded", options={"xatol": 1e-6 * step}).x)

@@ -281,8 +281,8 @@ def reference_of(converter: Converter, frames: Path, time: Floats, logs: list[Pa
         return sinusoid(time, reference.amplitude, reference.frequency_hz, phase)
     if isinstance(reference, FileReference) and logs:
         logged, rate = read_reference(logs[0], reference)
-        true: Floats = np.interp(time, logged, rate, left=np.nan, right=np.nan)
-        return true
+        truth: Floats = np.interp(time, logged, rate, left=np.nan, right=np.nan)
+        return truth
     return None
 
 
