@@ -1,13 +1,14 @@
 """The smoother: against the dense posterior, filterpy, closed forms, and simulated truths."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from vgyro.errors import DataError
 from vgyro.fusion.motion import smoother
-from vgyro.fusion.motion.models import Motion, SteadyGain, fixed_bandwidth, random_walk_keep
+from vgyro.fusion.motion.models import Motion, SpectralLine, SteadyGain, fixed_bandwidth, random_walk_keep
 from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
 from vgyro.fusion.motion.start import wide_start
 
@@ -158,6 +159,20 @@ def test_at_rest_within_a_motion(motion):
 
 def rms(values):
     return math.sqrt(np.mean(values**2))
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_standstill_beside_a_line(motion):
+    # Expected: a line of no size changes nothing, whatever the states of the model are.
+    z = np.random.default_rng(3).standard_normal(300)
+    at_rest, rest = np.arange(300) < 100, fixed_bandwidth(0.5, 1.0, RATE)
+    with_line = replace(motion, lines=(SpectralLine(3.0, 0.01, 1e-7),))
+    plain, other = (
+        smoother.smooth(z, 1.0, np.zeros(300, int), RATE, one, at_rest=at_rest, rest=rest)
+        for one in (motion, with_line)
+    )
+    assert other.rate == pytest.approx(plain.rate, abs=1e-6)
+    assert other.variance == pytest.approx(plain.variance, rel=1e-6)
 
 
 def test_what_does_not_fit():

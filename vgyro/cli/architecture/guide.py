@@ -148,11 +148,12 @@ def _rooms(house: House, order: Sequence[str]) -> Iterator[str]:
     rooms = sorted(house.rooms, key=place)
     above = {room: sorted(edges[room], key=place) for room in rooms}
     yield from _drawn("TB", direct(above), forward=False)
+    folders = house.folders_imported()
     for room in rooms:
-        yield from _room(house, room, above[room])
+        yield from _room(house, room, above[room], folders)
 
 
-def _room(house: House, room: str, imported: Sequence[str]) -> Iterator[str]:
+def _room(house: House, room: str, imported: Sequence[str], others: Mapping[str, Sequence[str]]) -> Iterator[str]:
     inside = [name for name in house.modules if house.room_of(name) == room]
     if room == FOUNDATION:
         yield "\n### foundation\n\n"
@@ -161,7 +162,6 @@ def _room(house: House, room: str, imported: Sequence[str]) -> Iterator[str]:
     yield f"\n### {room}\n\n{house.words[room]}\n\nImports {', '.join(imported)}.\n\n"
     folders = [name for name in house.words if name.startswith(f"{room}.") and house.folder_of(name) == name]
     if folders:
-        others = house.folders_imported()
         yield "| folder | what is in it | imports of this room |\n|---|---|---|\n"
         for folder in folders:
             mine = [one.removeprefix(f"{room}.") for one in others[folder] if one == room or one.startswith(f"{room}.")]

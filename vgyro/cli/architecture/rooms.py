@@ -22,11 +22,7 @@ class House:
     @cached_property
     def words(self) -> dict[str, str]:
         """Module or package, as in `fusion.motion.models` → first line of its docstring; sorted."""
-        found = {}
-        for path in sorted((self.top / PACKAGE).rglob("*.py")):
-            docstring = ast.get_docstring(self._tree(path)) or ""
-            found[self._name(path)] = docstring.partition("\n")[0]
-        return {name: found[name] for name in sorted(found) if name}
+        return {name: (ast.get_docstring(tree) or "").partition("\n")[0] for name, tree in self._trees.items()}
 
     @property
     def modules(self) -> list[str]:
@@ -53,11 +49,7 @@ class House:
     @cached_property
     def imports(self) -> dict[str, tuple[str, ...]]:
         """Module or package → modules and packages of vgyro that it imports anywhere, also within functions."""
-        found = {}
-        for path in sorted((self.top / PACKAGE).rglob("*.py")):
-            if name := self._name(path):
-                found[name] = tuple(sorted(set(self._imported(self._tree(path)))))
-        return found
+        return {name: tuple(sorted(set(self._imported(tree)))) for name, tree in self._trees.items()}
 
     def rooms_imported(self) -> dict[str, list[str]]:
         """Room → the other rooms that it imports."""
@@ -89,15 +81,21 @@ class House:
                     yield from [inner] if inner in self.words else []
 
     def _is_package(self, name: str) -> bool:
-        return (self.top / PACKAGE / name.replace(".", "/") / "__init__.py").is_file()
+        return name in self._packages
+
+    @cached_property
+    def _packages(self) -> frozenset[str]:
+        top = self.top / PACKAGE
+        return frozenset(".".join(path.parent.relative_to(top).parts) for path in top.rglob("__init__.py"))
+
+    @cached_property
+    def _trees(self) -> dict[str, ast.Module]:
+        found = {self._name(path): ast.parse(path.read_bytes()) for path in (self.top / PACKAGE).rglob("*.py")}
+        return {name: found[name] for name in sorted(found) if name}
 
     def _name(self, path: Path) -> str:
         parts = path.relative_to(self.top / PACKAGE).with_suffix("").parts
         return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-    @staticmethod
-    def _tree(path: Path) -> ast.Module:
-        return ast.parse(path.read_bytes())
 
 
 def direct(edges: Mapping[str, list[str]]) -> dict[str, list[str]]:

@@ -129,6 +129,6 @@ def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> Fl
         q = values["q"]
         factors = np.array([2.0, 3.0, 2.0]) if motion.model == "jerk" else np.full(2, math.sqrt(2.0))
     w = (q / density) ** (1.0 / (6.0 if motion.model == "jerk" else 4.0))
-    order = dynamics.order
+    order = dynamics.order[: len(factors)]  # The states of lines come after those of the model.
     known: Floats = density * factors * w ** (2 * order + 1) / motion.rate_hz ** (2 * order)
     return known
