@@ -7,8 +7,13 @@ import subprocess
 import sys
 import textwrap
 import tomllib
+from dataclasses import replace
 
 import pytest
+
+from vgyro.fusion import METHODS
+from vgyro.fusion.installed import _sources
+from vgyro.fusion.packages import _wrong_field
 
 HEAD = """
 import json, logging
@@ -220,3 +225,29 @@ def test_a_new_version_or_source_runs_the_jobs_again(root, tmp_path):
     assert len(set(fuse)) == 4
     for task in ("rates.decode", "simulate"):
         assert len({one[task] for one in found.values()}) == 1, task
+
+
+@pytest.mark.parametrize(
+    ("field", "right", "wrong"),
+    [
+        ("needs", ((), ("arw", "rrw")), ("arw", ("arw", 1), ["arw"])), ("title", ("x",), (None, 1)),
+        ("causal", (True,), (1, None)), ("same_at_any_rate", ({},), ("", ())), ("fuse", (len,), ("len",)),
+    ],
+)  # fmt: skip
+def test_fields_of_a_method(field, right, wrong):
+    assert {_wrong_field(replace(METHODS["average"], **{field: one})) for one in right} == {""}
+    for one in wrong:
+        assert _wrong_field(replace(METHODS["average"], **{field: one})) == f"average: {field} is {one!r}"
+
+
+def test_sources_of_modules_and_packages(tmp_path, monkeypatch):
+    # What is hashed: every Python file of a package, the file of a module; nothing of what is not there.
+    (tmp_path / "some_package/inner").mkdir(parents=True)
+    for name in ("some_module.py", "some_package/__init__.py", "some_package/one.py", "some_package/inner/two.py"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "some_package/data.txt").write_text("")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    inside = ["some_package/__init__.py", "some_package/inner/two.py", "some_package/one.py"]
+    assert _sources("some_package") == [tmp_path / name for name in inside]
+    assert _sources("some_module") == [tmp_path / "some_module.py"]
+    assert _sources("no_such_module") == []

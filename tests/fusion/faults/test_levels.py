@@ -93,6 +93,8 @@ def test_a_change_of_half_the_least_size_is_no_fault():
     (one,) = suspect_bias(part, 0, 1.0, 8.0)
     assert (one.kind, abs(one.first - 500) <= 2, abs(one.last - 600) <= 2) == ("step", True, True)
     assert suspect_bias(part, 0, 1.0, 1e3) == []
+    # Less than twenty blocks have no lasting change.
+    assert suspect_bias(slow(0.1 * np.random.default_rng(4).standard_normal(15)), 0, 1.0, 8.0) == []
 
 
 def test_a_drift_late_in_a_later_run_does_not_settle():

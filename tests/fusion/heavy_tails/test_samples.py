@@ -134,14 +134,14 @@ def test_sizes_of_gyros_that_do_not_change():
     # Rule: the size of the others stands in for none, then the steps of the values, then 1.
     rng = np.random.default_rng(1)
     values = np.zeros((3, 4000))
-    values[2] = rng.standard_normal(4000)
+    values[2] = 3.0 * rng.standard_normal(4000)
     used = np.ones(values.shape, dtype=bool)
 
     def usual(values, least):
         looks = [RateSamples(values, used[: len(values)], np.empty(0, dtype=np.int64))]
         return first_setting(looks, RATE_HZ, WARY, np.asarray(least)).usual
 
-    np.testing.assert_allclose(usual(values, [0.0] * 3), 1.0, rtol=0.06)
+    np.testing.assert_allclose(usual(values, [0.0] * 3), 3.0, rtol=0.06)
     np.testing.assert_allclose(usual(values[:2], [0.0, 0.5]), 0.5)
     np.testing.assert_allclose(usual(values[:2], [0.0, 0.0]), 1.0)
 
