@@ -13,6 +13,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import helmert
 
 from vgyro.fusion.faults.candidate import lengths_up_to
 from vgyro.fusion.faults.levels.drift_variance import Slow
@@ -39,28 +40,30 @@ UNKNOWN = 20
 
 @dataclass(frozen=True)
 class DriftGrid:
-    """Every pair of flicker and walk [G] for runs of n points with one profile of white noise.
+    """Every pair of flicker and walk [F, W] for runs of n points with one profile of white noise.
 
-    inverse : [G, n, n] of the covariance, any level taken out;  log_norm : [G]
-    changes : [n, T] forms of a change of level;  log_prior : [T] of their probabilities
-    power : [G, T] their squares in that inverse
+    With any level taken out, one basis makes the covariances of all walks beside one flicker diagonal.
+    basis : [F, n-1, n] of independent parts of the means;  precision : [F, W, n-1] of these;  log_norm : [F, W]
+    changes : [F, n-1, T] forms of a change of level in that basis
+    gain : [F, W, T] what a change gains for the square of its product with the means;  log_prior : [F, W, T] and less
     """
 
-    inverse: np.ndarray
+    basis: np.ndarray
+    precision: np.ndarray
     log_norm: np.ndarray
     changes: np.ndarray
+    gain: np.ndarray
     log_prior: np.ndarray
-    power: np.ndarray
 
-    def log_likelihood(self, mean: np.ndarray, size: float) -> np.ndarray:
-        """Of coarse means [n] in units of their white part, beside at most one change of that s.d. [G]."""
-        weighted = self.inverse @ mean
-        steady = -0.5 * (self.log_norm + weighted @ mean)
-        along = weighted @ self.changes
-        prior = size**-2.0
-        gain = 0.5 * along**2 / (self.power + prior) - 0.5 * np.log1p(self.power * size**2)
-        changed = np.logaddexp.reduce(gain + self.log_prior, axis=1)
-        return steady + np.logaddexp(np.log1p(-CHANGED), np.log(CHANGED) + changed)
+    def log_likelihood(self, mean: np.ndarray) -> np.ndarray:
+        """Of coarse means [n] in units of their white part, beside at most one change of level [F, W]."""
+        parts = self.basis @ mean
+        weighted = self.precision * parts[:, None, :]
+        steady = -0.5 * (self.log_norm + (weighted @ parts[:, :, None])[:, :, 0])
+        changed = (weighted @ self.changes) ** 2 * self.gain + self.log_prior
+        most = changed.max(axis=2, keepdims=True)
+        log_sum = most[:, :, 0] + np.log(np.exp(changed - most).sum(axis=2))
+        return steady + np.logaddexp(np.log1p(-CHANGED), np.log(CHANGED) + log_sum)
 
 
 def covariances(points: int) -> tuple[np.ndarray, np.ndarray]:
@@ -101,24 +104,28 @@ def changes_of_level(points: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=16)
-def _grid(points: int, profile: tuple[int, ...]) -> DriftGrid:
-    """profile : [n] powers of four, the variance of the white part of each point over its usual one."""
-    white = np.diag(4.0 ** np.array(profile, dtype=float))
-    flicker, walk = covariances(points)
-    both = FLICKERS[:, None, None, None] * flicker + WALKS[:, None, None] * walk
-    covariance = (white + both).reshape(-1, points, points)
-    factor = np.linalg.cholesky(covariance)
-    inverse = np.linalg.inv(covariance)
-    column = inverse.sum(axis=2)
-    total = column.sum(axis=1)
-    inverse -= column[:, :, None] * column[:, None, :] / total[:, None, None]
-    diagonal = np.diagonal(factor, axis1=1, axis2=2)
-    log_norm = 2.0 * np.log(diagonal).sum(axis=1) + np.log(total)
-    changes, log_prior = changes_of_level(points)
-    # Single precision: most of the work is here, and a prior is added to it.
-    short = changes.astype(np.float32)
-    power = np.maximum(((inverse.astype(np.float32) @ short) * short).sum(axis=1, dtype=float), 1e-12)
-    return DriftGrid(inverse, log_norm, changes, log_prior, power)
+def _grid(points: int, profile: tuple[int, ...], size: float) -> DriftGrid:
+    """profile : [n] powers of four, the variance of the white part of each point over its usual one
+
+    size : s.d. of a change, in units of the usual white part.  Points of which nothing is known have no part in it.
+    """
+    known = np.array(profile) < UNKNOWN
+    flicker, walk = (one[np.ix_(known, known)] for one in covariances(points))
+    forms, log_prior = changes_of_level(points)
+    contrasts = helmert(int(known.sum()))
+    white = np.diag(4.0 ** np.array(profile, dtype=float)[known])
+    steady = contrasts @ (white + FLICKERS[:, None, None] * flicker) @ contrasts.T
+    factor = np.linalg.cholesky(steady)
+    spread = np.linalg.solve(factor, contrasts @ walk @ contrasts.T)
+    spread, vectors = np.linalg.eigh(np.linalg.solve(factor, spread.transpose(0, 2, 1)))
+    basis = np.zeros((len(FLICKERS), len(contrasts), points))
+    basis[:, :, known] = vectors.transpose(0, 2, 1) @ np.linalg.solve(factor, contrasts)
+    variance = 1.0 + WALKS[:, None] * np.maximum(spread, 0.0)[:, None, :]
+    log_norm = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)[:, None] + np.log(variance).sum(axis=2)
+    changes = basis @ forms
+    power = (1.0 / variance) @ changes**2
+    gain = 0.5 / (power + size**-2.0)
+    return DriftGrid(basis, 1.0 / variance, log_norm, changes, gain, log_prior - 0.5 * np.log1p(power * size**2))
 
 
 @dataclass(frozen=True)
@@ -137,16 +144,16 @@ def likelihood_of(slow: Slow) -> Likelihood:
     """Of one gyro's flicker and walk, from the whole recording; runs have levels and changes of their own."""
     length = max(1, -(-len(slow.mean) // POINTS))
     runs = [coarse for coarse in (_coarse(slow, rows, length) for rows in _runs(slow.run)) if coarse is not None]
-    table = np.zeros(len(FLICKERS) * len(WALKS))
+    table = np.zeros((len(FLICKERS), len(WALKS)))
     if not runs:
-        return Likelihood(table.reshape(len(FLICKERS), -1), slow.usual_white / length, length)
+        return Likelihood(table, slow.usual_white / length, length)
     known = np.concatenate([white[np.isfinite(white)] for _, white in runs])
     unit = float(np.median(known))
-    size = CHANGE_SD * np.sqrt(length)
+    size = CHANGE_SD * float(np.sqrt(length))
     for mean, white in runs:
         profile = np.where(np.isfinite(white), np.rint(0.5 * np.log2(white / unit)), UNKNOWN).astype(int)
-        table += _grid(len(mean), tuple(profile.tolist())).log_likelihood(mean / np.sqrt(unit), size)
-    return Likelihood(table.reshape(len(FLICKERS), -1), unit, length)
+        table += _grid(len(mean), tuple(profile.tolist()), size).log_likelihood(mean / np.sqrt(unit))
+    return Likelihood(table, unit, length)
 
 
 def _runs(run: np.ndarray) -> list[slice]:
