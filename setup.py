@@ -13,7 +13,8 @@ from setuptools import Extension, setup
 NATIVE = Path("vgyro/engine/native")
 # The same bits on every instruction set: no fused multiply-add, no reordering.
 FLAGS = ["-O3", "-std=gnu11", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi"]
-SANITIZE = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+# As written: the compiler can take nothing away before it is checked, and is done in a third of the time.
+SANITIZE = ["-O0", "-g1", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
 
 def extensions() -> list[Extension]:

@@ -71,10 +71,14 @@ class Chain:
         write_json(self.folder / "integrity.json", {"rate_hz": RATE_HZ, "clocks": []})
         write_json(self.folder / "calibration.json", {"gyros": dict.fromkeys(self.gyros, row)})
 
-    def all(self) -> None:
-        """Everything from frames.parquet on."""
+    def convert(self) -> None:
+        """rates.parquet from frames.parquet."""
         inputs = {"frames": "frames.parquet", "integrity": "integrity.json", "calibration": "calibration.json"}
         self.run(convert, {**inputs, "reference": []}, ("rates",))
+
+    def all(self) -> None:
+        """Everything from frames.parquet on."""
+        self.convert()
         self.run(noise, {"rates": "rates.parquet"}, ("noise.json",))
         weights = self.weights() if self.volatility else {"weights": [], "moved": []}
         self.run(faults, {"rates": "rates.parquet", "calibration": "calibration.json"}, ("faults",))

@@ -168,7 +168,7 @@ def test_standstill_beside_a_line(motion):
     at_rest, rest = np.arange(300) < 100, fixed_bandwidth(0.5, 1.0, RATE)
     with_line = replace(motion, lines=(SpectralLine(3.0, 0.01, 1e-7),))
     plain, other = (
-        smoother.smooth(z, 1.0, np.zeros(300, int), RATE, one, at_rest=at_rest, rest=rest)
+        smoother.smooth(NoisyRate(z, 1.0, np.zeros(300, int), RATE), one, standstill=Standstill(at_rest, rest))
         for one in (motion, with_line)
     )
     assert other.rate == pytest.approx(plain.rate, abs=1e-6)

@@ -155,6 +155,9 @@ class TextScanner:
     def _found(self, texts: list[bytes], start: np.ndarray, stop: np.ndarray, end: int) -> FoundFrames:
         """The frames of the lines; what lies between them and up to `end` is judged as far as its lines are whole."""
         values, fits = self._values(texts)
+        if not texts:
+            self._judge(self._judged, end, set(), whole=False)
+            return self._frames(values, start, stop, np.empty(0, dtype=np.uint8), {})
         valid = np.ones(len(texts), dtype=bool)
         for name, value in self._frame.require.items():
             valid &= values[name] == value

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy.linalg import helmert
 
 from vgyro.arrays import Floats
 from vgyro.fusion.faults.candidate import lengths_up_to
@@ -40,35 +41,36 @@ UNKNOWN = 20
 
 @dataclass(frozen=True)
 class DriftGrid:
-    """The likelihoods of all G pairs of flicker and random walk, made ready for series of n points.
+    """The likelihoods of all pairs of F flickers and W random walks, made ready for series of n points.
 
-    It serves every series whose points have the same variances of their white parts relative to each other.
-    inverse   : [G, n, n], inverse covariance of the points, from which any constant level has been taken out
-    log_norm  : [G], logarithm of the determinants that belongs to it
-    changes   : [n, T], forms that a change of level may have, each of the size 1
-    log_prior : [T], logarithm of the probability of each form
-    power     : [G, T], squares of the forms in `inverse`: how much a change of the size 1 would show
+    It serves every series whose points have the same variances of their white parts relative to each other. With any
+    level taken out, one basis makes the covariances of all walks beside one flicker diagonal.
+    basis     : [F, n-1, n] of independent parts of the points;  precision : [F, W, n-1], inverse variances of these
+    log_norm  : [F, W], logarithm of the determinants that belongs to them
+    changes   : [F, n-1, T], forms that a change of level may have, in that basis
+    gain      : [F, W, T], what a change gains for the square of its product with the points
+    log_prior : [F, W, T], logarithm of the probability of each form, less what its unknown size costs
     """
 
-    inverse: np.ndarray
+    basis: np.ndarray
+    precision: np.ndarray
     log_norm: np.ndarray
     changes: np.ndarray
+    gain: np.ndarray
     log_prior: np.ndarray
-    power: np.ndarray
 
-    def log_likelihood(self, mean: Floats, size: float) -> Floats:
-        """Log likelihood [G] of the points, with one change of level or none.
+    def log_likelihood(self, mean: Floats) -> Floats:
+        """Log likelihood [F, W] of the points, with one change of level or none.
 
-        mean : [n], means in units of the root of their usual white variance;  size : s.d. of a change, in the same
-               units
+        mean : [n], means in units of the root of their usual white variance
         """
-        weighted = self.inverse @ mean
-        steady = -0.5 * (self.log_norm + weighted @ mean)
-        along = weighted @ self.changes
-        prior = size**-2.0
-        gain = 0.5 * along**2 / (self.power + prior) - 0.5 * np.log1p(self.power * size**2)
-        changed = np.logaddexp.reduce(gain + self.log_prior, axis=1)
-        likelihood: Floats = steady + np.logaddexp(np.log1p(-CHANGED), np.log(CHANGED) + changed)
+        parts = self.basis @ mean
+        weighted = self.precision * parts[:, None, :]
+        steady = -0.5 * (self.log_norm + (weighted @ parts[:, :, None])[:, :, 0])
+        changed = (weighted @ self.changes) ** 2 * self.gain + self.log_prior
+        most = changed.max(axis=2, keepdims=True)
+        log_sum = most[:, :, 0] + np.log(np.exp(changed - most).sum(axis=2))
+        likelihood: Floats = steady + np.logaddexp(np.log1p(-CHANGED), np.log(CHANGED) + log_sum)
         return likelihood
 
 
@@ -112,24 +114,28 @@ def changes_of_level(points: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=16)
-def _grid(points: int, profile: tuple[int, ...]) -> DriftGrid:
-    """profile : [n] powers of four, the variance of the white part of each point over its usual one."""
-    white = np.diag(4.0 ** np.array(profile, dtype=float))
-    flicker, walk = covariances(points)
-    both = FLICKERS[:, None, None, None] * flicker + WALKS[:, None, None] * walk
-    covariance = (white + both).reshape(-1, points, points)
-    factor = np.linalg.cholesky(covariance)
-    inverse = np.linalg.inv(covariance)
-    column = inverse.sum(axis=2)
-    total = column.sum(axis=1)
-    inverse -= column[:, :, None] * column[:, None, :] / total[:, None, None]
-    diagonal = np.diagonal(factor, axis1=1, axis2=2)
-    log_norm = 2.0 * np.log(diagonal).sum(axis=1) + np.log(total)
-    changes, log_prior = changes_of_level(points)
-    # Single precision: most of the work is here, and a prior is added to it.
-    short = changes.astype(np.float32)
-    power = np.maximum(((inverse.astype(np.float32) @ short) * short).sum(axis=1, dtype=float), 1e-12)
-    return DriftGrid(inverse, log_norm, changes, log_prior, power)
+def _grid(points: int, profile: tuple[int, ...], size: float) -> DriftGrid:
+    """profile : [n] powers of four, the variance of the white part of each point over its usual one
+
+    size : s.d. of a change, in units of the usual white part.  Points of which nothing is known have no part in it.
+    """
+    known = np.array(profile) < UNKNOWN
+    flicker, walk = (one[np.ix_(known, known)] for one in covariances(points))
+    forms, log_prior = changes_of_level(points)
+    contrasts = helmert(int(known.sum()))
+    white = np.diag(4.0 ** np.array(profile, dtype=float)[known])
+    steady = contrasts @ (white + FLICKERS[:, None, None] * flicker) @ contrasts.T
+    factor = np.linalg.cholesky(steady)
+    spread = np.linalg.solve(factor, contrasts @ walk @ contrasts.T)
+    spread, vectors = np.linalg.eigh(np.linalg.solve(factor, spread.transpose(0, 2, 1)))
+    basis = np.zeros((len(FLICKERS), len(contrasts), points))
+    basis[:, :, known] = vectors.transpose(0, 2, 1) @ np.linalg.solve(factor, contrasts)
+    variance = 1.0 + WALKS[:, None] * np.maximum(spread, 0.0)[:, None, :]
+    log_norm = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)[:, None] + np.log(variance).sum(axis=2)
+    changes = basis @ forms
+    power = (1.0 / variance) @ changes**2
+    gain = 0.5 / (power + size**-2.0)
+    return DriftGrid(basis, 1.0 / variance, log_norm, changes, gain, log_prior - 0.5 * np.log1p(power * size**2))
 
 
 @dataclass(frozen=True)
@@ -150,16 +156,16 @@ def likelihood_of(slow: Slow) -> Likelihood:
     """Of one gyro's flicker and walk, from the whole recording; runs have levels and changes of their own."""
     length = max(1, -(-len(slow.mean) // POINTS))
     runs = [coarse for coarse in (_coarse(slow, rows, length) for rows in _runs(slow.run)) if coarse is not None]
-    table = np.zeros(len(FLICKERS) * len(WALKS))
+    table = np.zeros((len(FLICKERS), len(WALKS)))
     if not runs:
-        return Likelihood(table.reshape(len(FLICKERS), -1), slow.usual_white / length, length)
+        return Likelihood(table, slow.usual_white / length, length)
     known = np.concatenate([white[np.isfinite(white)] for _, white in runs])
     unit = float(np.median(known))
-    size = CHANGE_SD * np.sqrt(length)
+    size = CHANGE_SD * float(np.sqrt(length))
     for mean, white in runs:
         profile = np.where(np.isfinite(white), np.rint(0.5 * np.log2(white / unit)), UNKNOWN).astype(int)
-        table += _grid(len(mean), tuple(profile.tolist())).log_likelihood(mean / np.sqrt(unit), size)
-    return Likelihood(table.reshape(len(FLICKERS), -1), unit, length)
+        table += _grid(len(mean), tuple(profile.tolist()), size).log_likelihood(mean / np.sqrt(unit))
+    return Likelihood(table, unit, length)
 
 
 def _runs(run: np.ndarray) -> list[slice]:
