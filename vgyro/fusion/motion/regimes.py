@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vgyro.arrays import Floats
 from vgyro.errors import DataError
-from vgyro.fusion.motion.models import Activity, Dynamics, Motion
+from vgyro.fusion.motion.models import Activity, Dynamics, Motion, SpectralLine
 from vgyro.fusion.motion.noisy_rate import Standstill
+from vgyro.runs import true_runs
 
 JUMP = 5.0
 """Means on both sides that differ by so many standard deviations: a jump."""
@@ -50,13 +52,17 @@ class Regimes:
         density: float,
         jumps: np.ndarray,
         free: float,
+        ending: Sequence[int] = (),
     ) -> Regimes:
         """In a standstill the rate is the random walk of its motion; to the samples `jumps` it may go anywhere.
 
         density : of the noise, deg²/s;  free : variance of a step that may go anywhere, (deg/s)²
+        ending  : numbers of the lines of the motion that are not there in a standstill
         """
         at_rest, rest = standstill
         still, slowed = _at_rest(dynamics, motion, rest, density)
+        for line in ending:
+            _end(dynamics, len(dynamics.reads) - 2 * (len(motion.lines) - line), still, slowed)
         freed = slowed.copy()
         freed[0, 0] += free
         of_sample = np.where(at_rest, len(self.calibration), self.of_sample).astype(np.uint8)
@@ -69,6 +75,33 @@ class Regimes:
             np.append(self.calibration, rest.calibration),
             of_sample,
         )
+
+
+def lines_that_end(
+    z: np.ndarray, r: np.ndarray, lines: Sequence[SpectralLine], at_rest: np.ndarray, rate_hz: float
+) -> list[int]:
+    """Numbers of the lines of a motion that are not there in its standstill, where they would be seen.
+
+    z [T], deg/s, r, one or [T] : as in NoisyRate;  at_rest : [T] of bool
+    A sinusoid of the line's frequency is fitted to each stretch at rest. Less than half of the line's s.d. in all of
+    them, what the noise does to it allowed for: it ends. A stretch shorter than a period says that it ends, for the
+    board does not stand still in the midst of a swing.
+    """
+    r = np.broadcast_to(r, z.shape)
+    ending = []
+    for number, line in enumerate(lines):
+        power = noise = samples = 0.0
+        for start, stop in true_runs(at_rest & np.isfinite(r)).tolist():
+            if (stop - start) * line.frequency_hz < rate_hz:
+                continue
+            turns = np.exp(-2j * math.pi * line.frequency_hz / rate_hz * np.arange(stop - start))
+            swing = turns @ (z[start:stop] - z[start:stop].mean())
+            power += 2.0 * abs(swing) ** 2 / (stop - start)
+            noise += 2.0 * float(r[start:stop].mean())
+            samples += stop - start
+        if samples == 0.0 or power - noise < 0.25 * line.sd**2 * samples:
+            ending.append(number)
+    return ending
 
 
 def jumps_at_ends(
@@ -110,7 +143,33 @@ def _at_rest(dynamics: Dynamics, motion: Motion, rest: Motion, density: float) -
         F[1:states, :states] = 0.0
         F[0, :states] = dynamics.reads[:states]
         Q[1:states, 1:states] = np.diag(_known_derivatives(motion, dynamics, density)[1:states])
+    if _in_full_swing(motion):
+        _end(dynamics, 1, F, Q)
     return F, Q
+
+
+def _end(dynamics: Dynamics, place: int, F: np.ndarray, Q: np.ndarray) -> None:
+    """An oscillation of the states x, x'·T at `place` is not there at rest, and begins again as if it had never ended.
+
+    Changes F and Q of a step to a sample at rest. State 0 takes over what the oscillation had of the rate, and makes up
+    for the x with which it begins, so that the rate goes on.
+    """
+    own = slice(place, place + 2)
+    F[own], F[0, place] = 0.0, 1.0
+    Q[own], Q[:, own] = 0.0, 0.0
+    x, slope = np.diagonal(dynamics.stationary)[own]
+    Q[0, 0] += x
+    Q[0, place] = Q[place, 0] = -x
+    Q[place, place], Q[place + 1, place + 1] = x, slope
+
+
+def _in_full_swing(motion: Motion) -> bool:
+    """Is the motion an oscillation that would take longer than a period to grow by what drives it, 1/(2ζω) > 2π/ω?
+
+    A table that begins to swing does so at once.
+    """
+    values = motion.parameters
+    return motion.model == "oscillator" and "second_hz" not in values and values["damping"] < 0.25 / math.pi
 
 
 def _known_derivatives(motion: Motion, dynamics: Dynamics, density: float) -> Floats:
