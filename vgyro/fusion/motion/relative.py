@@ -17,6 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from vgyro.fusion.events import excluded
+from vgyro.fusion.motion.savgol import savgol, savgol_coefficients
 from vgyro.fusion.noise.quiet_frequencies import quiet_noise
 from vgyro.fusion.types import ArrayRates
 from vgyro.fusion.weights import min_variance_weights, usable
@@ -195,21 +196,17 @@ def smoothing_window(array: ArrayRates, mean: np.ndarray, noise: float) -> int |
 
 
 def _kernel(window: int) -> np.ndarray:
-    from scipy.signal import savgol_coeffs
-
-    return savgol_coeffs(window, ORDER) if window > 1 else np.ones(1)
+    return savgol_coefficients(window, ORDER) if window > 1 else np.ones(1)
 
 
 def smoothed(array: ArrayRates, values: np.ndarray, window: int, derivative: int = 0) -> np.ndarray:
     """Values [T] or their derivative by s^derivative, smoothed in each gap-free stretch."""
-    from scipy.signal import savgol_filter
-
     found = np.empty(len(values))
     for part in array.stretches():
         length = part.stop - part.start
         own = min(window, length - 1 + length % 2)
         if own > ORDER:
-            found[part] = savgol_filter(values[part], own, ORDER, deriv=derivative, delta=array.period)
+            found[part] = savgol(values[part], own, ORDER, derivative, array.period)
             continue
         piece = values[part].astype(float)
         for _ in range(derivative):

@@ -219,9 +219,7 @@ def _least_squares(base: np.ndarray, series: np.ndarray) -> np.ndarray:
 
 def _innovations(series: np.ndarray, autoregression: np.ndarray) -> np.ndarray:
     """What an autoregression leaves of a series; what lies before its first sample counts as zero."""
-    from scipy.signal import lfilter
-
-    return lfilter(np.concatenate([[1.0], -autoregression]), [1.0], series)
+    return np.convolve(np.concatenate([[1.0], -autoregression]), series)[: len(series)]
 
 
 def _slope(series: np.ndarray) -> float:
