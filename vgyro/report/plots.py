@@ -270,7 +270,7 @@ def _add_hover(plot: figure, renderers: list[Any], x: Axis, y: Axis) -> None:
 def _as_json(plot: figure, identifier: str) -> str:
     """Bokeh's JSON of a plot, with ids that depend on the plot's name alone.
 
-    What bokeh.embed.json_item returns, without its checks and lists of all parts of the plot, which take as long as the rest.
+    What bokeh.embed.json_item returns, without its checks of the plot, which take as long as the rest.
     """
     import bokeh
     from bokeh.core.serialization import Serializer

@@ -143,10 +143,10 @@ def solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray, bounded
     scaled = columns * root[:, None]
     norm = np.sqrt((scaled * scaled).sum(axis=0))
     scaled /= norm
-    within, beyond = _masks(columns.shape[1], bounded)
+    chosen, within, beyond = _masks(columns.shape[1], bounded)
     gram = (scaled.T @ scaled) * within + beyond
     right = np.ascontiguousarray(((targets * root) @ scaled).T)
-    values = _solved(gram, right, within)
+    values = _solved(gram, right, chosen, within)
     explained = (values * right).sum(axis=1)
     explained[(values[:, :bounded] < 0).any(axis=1)] = -np.inf
     best = explained.argmax(axis=0)
@@ -154,13 +154,12 @@ def solve(columns: np.ndarray, targets: np.ndarray, weights: np.ndarray, bounded
     return values[best, :, row] / norm, explained[best, row]
 
 
-def _solved(gram: np.ndarray, right: np.ndarray, within: np.ndarray) -> np.ndarray:
+def _solved(gram: np.ndarray, right: np.ndarray, chosen: np.ndarray, within: np.ndarray) -> np.ndarray:
     """Solutions [S, C, R] of symmetric equations; the shortest one where some are singular.
 
     They are where the weights leave a single τ: there the shapes of two terms are the same.
-    gram, within : [S, C, C], as _masks gives them;  right : [C, R], zero in a subset where its column is not
+    gram : [S, C, C];  right : [C, R], zero in a subset where its column is not;  chosen, within : of _masks
     """
-    chosen = np.diagonal(within, axis1=1, axis2=2)[:, :, None]
     try:
         if right.shape[1] == 1:
             return np.linalg.solve(gram, right * chosen)
@@ -171,11 +170,14 @@ def _solved(gram: np.ndarray, right: np.ndarray, within: np.ndarray) -> np.ndarr
 
 
 @cache
-def _masks(number: int, bounded: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of each subset the products that its equations keep, and the ones of x = 0 of all other columns, [S, C, C]."""
+def _masks(number: int, bounded: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each subset the columns in it [S, C, 1], and the products of its equations that are kept [S, C, C].
+
+    And the equations x = 0 of all other columns, [S, C, C].
+    """
     chosen = _subsets(number, bounded)
     within = (chosen[:, :, None] & chosen[:, None, :]).astype(float)
-    return within, np.eye(number) * ~chosen[:, :, None]
+    return chosen[:, :, None].astype(float), within, np.eye(number) * ~chosen[:, :, None]
 
 
 @cache
