@@ -159,6 +159,7 @@ class Analysis(StrictModel):
         "native",
         description="who computes; native: C kernels; reference: arch, pymgarch, cvxpy, filterpy, allantools (slow)",
     )
+    bekk: bool = Field(False, description="true: BEKK beside DCC on as many random windows as crosscheck.windows; slow")
     integrity: IntegrityOptions = IntegrityOptions()
     rest: RestOptions = RestOptions()
     calibration: CalibrationOptions = CalibrationOptions()

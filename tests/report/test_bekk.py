@@ -59,3 +59,7 @@ def test_the_table_has_a_part_for_each_definition(array: ArrayPart) -> None:
     assert "DCC against its alternatives" in volatility_part(array)
     without = {name: table for name, table in array.tables.items() if name != "bekk"}
     assert bekk_part(replace(array, tables=without)) == ""
+    page = volatility_part(replace(array, tables=without))
+    assert "ARCH-LM" in page
+    assert "BEKK" not in page
+    assert "alternatives" not in page

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vgyro.config import Analysis, override_analysis
 from vgyro.dataset import parse_manifest
 from vgyro.simulate import (
     Twin,
@@ -67,6 +68,12 @@ def test_analysis_of_a_twin_may_be_partial() -> None:
     manifest = manifest_of(twin)
     assert manifest.analysis is not None
     assert manifest.analysis.model_dump(exclude_unset=True) == {"volatility": {"step": 500}}
+
+
+@pytest.mark.parametrize("name", ["jiang2012", "liu2015", "demo", "endurance"])
+def test_bekk_is_for_the_twins_of_the_papers(root: Path, name: str) -> None:
+    options = override_analysis(Analysis(), manifest_of(shipped(root, name)).analysis)
+    assert options.bekk == (name in ("jiang2012", "liu2015"))
 
 
 def test_overrides_go_over_all(root: Path) -> None:

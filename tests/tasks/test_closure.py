@@ -17,15 +17,16 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path / "vgyro"
     shutil.copytree(closure.ROOT, root, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(closure, "ROOT", root)
-    closure._imports.cache_clear()
+    closure.forget()
     yield root
-    closure._imports.cache_clear()
+    closure.forget()
 
 
 def changed_by_edit(package: Path, file: str, tasks: list[str]) -> set[str]:
     before = {task: closure.code_hash(f"vgyro.tasks.{task}") for task in tasks}
     path = package / file
     path.write_text(path.read_text(encoding="utf-8") + "\n# edited\n", encoding="utf-8")
+    closure.forget()
     return {task for task in tasks if closure.code_hash(f"vgyro.tasks.{task}") != before[task]}
 
 

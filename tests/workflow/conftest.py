@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
 COPIED = ("Snakefile", "workflow", "profiles", "config", "vgyro")
 
 

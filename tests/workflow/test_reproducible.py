@@ -23,6 +23,9 @@ def test_second_run_one_core_and_edits(lab) -> None:
     products = lab.products()
     assert any(name.endswith("fused.parquet") for name in products)
 
+    assert not any("bekk" in name for name in products)
+    assert "BEKK" not in (lab.folder / "reports/tiny.html").read_text(encoding="utf-8")
+
     second = lab.run("--cores", "2")
     assert second.returncode == 0, second.stdout
     assert "Nothing to be done" in second.stdout
@@ -48,6 +51,25 @@ def test_second_run_one_core_and_edits(lab) -> None:
     assert "volatility_chunk" in again.stdout
     assert lab.products() == products
     assert "Nothing to be done" in lab.run("--cores", "2").stdout
+
+
+def test_bekk_runs_where_it_is_asked_for(lab) -> None:
+    config = lab.folder / "config/config.yaml"
+    without, text = lab.products(), config.read_text(encoding="utf-8")
+    config.write_text(text.replace("bekk: false", "bekk: true"), encoding="utf-8")
+    done = lab.run("--cores", "2")
+    assert done.returncode == 0, done.stdout
+    assert jobs_planned(done.stdout) == {"bekk", "report", "index", "verdict"}
+    found = lab.products()
+    assert set(found) - set(without) == {"results/tiny/static/z/bekk.parquet"}
+    changed = {name for name in without if found[name] != without[name]}
+    assert changed == {"reports/tiny.html"}
+    assert "BEKK, diagonal" in (lab.folder / "reports/tiny.html").read_text(encoding="utf-8")
+
+    config.write_text(text, encoding="utf-8")
+    done = lab.run("--cores", "2")
+    assert jobs_planned(done.stdout) == {"report", "index", "verdict"}
+    assert {name: digest for name, digest in lab.products().items() if "bekk" not in name} == without
 
 
 def test_progress_is_shown_and_units_are_inside(lab) -> None:

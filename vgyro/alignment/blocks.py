@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri, stdtrit
 
 from vgyro.arrays import Floats
 from vgyro.runs import runs
@@ -111,7 +111,7 @@ def score_covariance(blocks: SampleBlocks, slopes: Floats, residual: Floats) -> 
     transforms = blocks.spectra(slopes)
     bins = blocks.bins / blocks.padded
     even: Floats = np.einsum("pbf,qbf,f->pq", transforms, transforms.conj(), colour * bins, optimize=True).real
-    even *= (float(stats.t.ppf(0.975, 4 * effective)) / float(stats.norm.ppf(0.975))) ** 2
+    even *= (float(stdtrit(4 * effective, 0.975)) / float(ndtri(0.975))) ** 2
     if effective < FEWEST_FOR_OWN:
         return even
     own = blocks.sums(slopes * residual)

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri
 
 from vgyro.alignment.coarse import search
 from vgyro.alignment.growth import (
@@ -196,7 +196,7 @@ def _evidence(fit: PairFit, chance: float, cutoff: float, rival: tuple[float, fl
 
 
 def _clock(fit: PairFit, evidence: ClockEvidence, starts: tuple[float, float], most_ppm: float) -> ClockFit:
-    z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
+    z = float(ndtri(0.5 + CONFIDENCE / 2))
     line, drift_error = fit.line, math.sqrt(fit.covariance[1, 1])
     known = z * drift_error < 1e-6 * most_ppm
     if not known:
@@ -212,7 +212,7 @@ def _clock(fit: PairFit, evidence: ClockEvidence, starts: tuple[float, float], m
         drift_error = 1e-6 * most_ppm / z
     drift = parts_per_million(line.drift)
     stamped = starts[1] - starts[0]
-    stricter = float(stats.norm.ppf(1 - (1 - CONFIDENCE) / 4)) / z  # two questions are asked
+    stricter = float(ndtri(1 - (1 - CONFIDENCE) / 4)) / z  # two questions are asked
     status = AMBIGUOUS if evidence.rival_odds < RIVAL_ODDS else FOUND
     return ClockFit(
         start,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri
 
 from vgyro.alignment.blocks import SampleBlocks, block_numbers, score_covariance
 from vgyro.alignment.clock import CUTOFFS_HZ
@@ -215,8 +215,8 @@ def _contrast(fit: _DelayFit, group: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def _spread_out(
     delay: np.ndarray, error: np.ndarray, columns: np.ndarray, gyros: int, false_alarm: float, moving_s: float
 ) -> Delays:
-    z = float(stats.norm.ppf(0.975))
-    strict = float(stats.norm.ppf(1 - false_alarm / (2 * len(delay))))
+    z = float(ndtri(0.975))
+    strict = float(ndtri(1 - false_alarm / (2 * len(delay))))
     result = np.full((3, gyros), np.nan)
     result[:, columns] = delay, delay - z * error, delay + z * error
     significant = np.zeros(gyros, dtype=bool)

@@ -6,7 +6,6 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from vgyro.alignment.interpolation import interpolate
 from vgyro.arrays import Floats
@@ -104,6 +103,8 @@ def low_pass(stream: AlignedStream, cutoff_hz: float) -> Band:
 
 def _filters(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
     """Taps of the low pass and of its derivative by the sample; cutoff in cycles a sample."""
+    from scipy import signal
+
     count, beta = signal.kaiserord(STOP_DB, 2 * cutoff)
     count += 1 - count % 2
     taps = signal.firwin(count, min(1.5 * cutoff, 0.45), window=("kaiser", beta), fs=1.0)
@@ -117,6 +118,8 @@ def _filters(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _thin(taps: Floats, values: Floats, factor: int, count: int) -> Floats:
     """Filtered values at every factor-th sample at which the filter lies within the stretch."""
+    from scipy import signal
+
     skip = len(taps) - 1
     if factor == 1:
         thinned: Floats = signal.oaconvolve(values, taps, mode="valid")[:count]

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from vgyro.arrays import Floats
+
+SHORT = 20_000
+"""Samples."""
 
 
 def garch_variance(
@@ -19,8 +24,6 @@ def garch_variance(
     returns            : [T, N] (deg/s)²
     Bollerslev (1986); Liu et al. (2015), eq. 1.
     """
-    from scipy.signal import lfilter
-
     square = np.square(np.asarray(r, dtype=float))
     omega, alpha, beta = (np.broadcast_to(np.asarray(p, dtype=float), square.shape[1:]) for p in (omega, alpha, beta))
     if start is None:
@@ -28,7 +31,25 @@ def garch_variance(
     driven = np.empty_like(square)
     driven[0] = start
     driven[1:] = omega + alpha * square[:-1]
-    columns = [lfilter([1.0], [1.0, -b], driven[:, i]) for i, b in enumerate(beta)]
+    return _carried(driven, beta)
+
+
+def _carried(driven: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """x_t = driven_t + share·x_{t-1} along axis 0, [T, ...]; share : [] or [N], one a column.
+
+    Sample by sample where that takes no longer than importing scipy.signal: the bits are the same.
+    """
+    if len(driven) <= SHORT:
+        carried = driven.copy()
+        for before, now in itertools.pairwise(carried):
+            now += share * before
+        return carried
+    from scipy.signal import lfilter
+
+    if not share.ndim:
+        filtered: Floats = lfilter([1.0], [1.0, -float(share)], driven, axis=0)
+        return filtered
+    columns = [lfilter([1.0], [1.0, -one], column) for one, column in zip(share, driven.T, strict=True)]
     return np.stack(columns, axis=1) if columns else driven
 
 
@@ -57,12 +78,10 @@ def dcc_q(z: Floats, a: float, b: float, target: Floats, start: Floats | None = 
 
     Engle (2002); Liu et al. (2015), eq. 4.
     """
-    from scipy.signal import lfilter
-
     driven = np.empty((*z.shape, z.shape[1]))
     driven[0] = 0.0 if start is None else start - target
     driven[1:] = a * (z[:-1, :, None] * z[:-1, None, :] - target)
-    q: Floats = target + lfilter([1.0], [1.0, -b], driven, axis=0)
+    q: Floats = target + _carried(driven, np.asarray(b))
     return q
 
 

@@ -283,13 +283,20 @@ def _add_hover(plot: figure, renderers: list[Any], x: Axis, y: Axis) -> None:
 
 
 def _as_json(plot: figure, identifier: str) -> str:
-    """Bokeh's JSON of a plot, with ids that depend on the plot's name alone."""
-    from bokeh.embed import json_item
+    """Bokeh's JSON of a plot, with ids that depend on the plot's name alone.
 
-    record = json_item(plot, f"{identifier}-canvas")
-    record["doc"]["title"] = identifier
+    What bokeh.embed.json_item returns, without its checks of the plot, which take as long as the rest.
+    """
+    import bokeh
+    from bokeh.core.serialization import Serializer
+    from bokeh.document import Document
+
+    found = Document(title=identifier).to_json(deferred=False)
+    found["roots"] = Serializer(deferred=False).encode([plot])
+    root = found["roots"][0]["id"]
+    record = {"target_id": f"{identifier}-canvas", "root_id": root, "doc": found, "version": bokeh.__version__}
     names: dict[str, str] = {}
-    _collect_ids(record["doc"], names, identifier)
+    _collect_ids(found, names, identifier)
     return json.dumps(_renamed(record, names), separators=(",", ":"), ensure_ascii=False)
 
 

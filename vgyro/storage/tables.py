@@ -166,7 +166,8 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
 
 def read_columns(path: str | Path, columns: list[str] | None = None) -> dict[str, np.ndarray]:
     """Columns of a table as NumPy arrays; list columns come as object arrays of arrays."""
-    table = pq.read_table(path, columns=columns)
+    # Not pq.read_table: that loads pyarrow.dataset.
+    table = pq.ParquetFile(path).read(columns=columns)
     return {name: table.column(name).to_numpy() for name in table.column_names}
 
 

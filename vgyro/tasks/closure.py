@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -25,16 +26,30 @@ def code_hash(module: str) -> str:
     if REGISTRY in reached:
         digest.update(fingerprint().encode())
     for name in sorted(reached):
-        path = _source(name)
-        digest.update(name.encode() + b"\0" + path.read_bytes())
-        for source in _c_sources(path):
-            digest.update(source.name.encode() + b"\0" + source.read_bytes())
-        if path.name == "__init__.py":
-            for data in sorted(entry for entry in path.parent.rglob("*") if _is_data(entry)):
-                digest.update(str(data.relative_to(ROOT)).encode() + b"\0" + data.read_bytes())
+        digest.update(name.encode() + b"\0" + _digest(name))
     return digest.hexdigest()
 
 
+def forget() -> None:
+    """Look at all sources anew: what is known of them is kept for the life of the process."""
+    for known in (_digest, _imports, _source, sections_of):
+        known.cache_clear()
+
+
+@cache
+def _digest(module: str) -> bytes:
+    """SHA-256 of a module's source, its C files, and the data files of a package."""
+    path = _source(module)
+    digest = hashlib.sha256(path.read_bytes())
+    for source in _c_sources(path):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    if path.name == "__init__.py":
+        for data in sorted(entry for entry in path.parent.rglob("*") if _is_data(entry)):
+            digest.update(str(data.relative_to(ROOT)).encode() + b"\0" + data.read_bytes())
+    return digest.digest()
+
+
+@cache
 def sections_of(module: str) -> tuple[str, ...]:
     """SECTIONS of a task's module: what it asks of manifest, board and `analysis`. Read, so that nothing is imported.
 
@@ -70,8 +85,8 @@ def _imports(module: str, on_demand: bool) -> tuple[tuple[str, bool], ...]:
     path = _source(module)
     if path.suffix == ".pyx":
         return ()
-    tree = ast.parse(path.read_bytes())
-    nodes = ast.walk(tree) if on_demand else iter(tree.body)
+    body = ast.parse(path.read_bytes()).body
+    nodes = _statements(body) if on_demand else iter(body)
     found: set[tuple[str, bool]] = set()
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -84,6 +99,17 @@ def _imports(module: str, on_demand: bool) -> tuple[tuple[str, bool], ...]:
     return tuple(sorted((name, deep) for name, deep in found if name.split(".")[0] == PACKAGE and _exists(name)))
 
 
+def _statements(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
+    """All statements, at any depth: where an import can stand. Expressions, which are most of a tree, are left out."""
+    waiting = list(body)
+    while waiting:
+        statement = waiting.pop()
+        yield statement
+        for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+            waiting += getattr(statement, name, ())
+
+
+@cache
 def _source(module: str) -> Path:
     path = ROOT.joinpath(*module.split(".")[1:])
     if path.is_dir():

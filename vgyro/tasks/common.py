@@ -16,6 +16,7 @@ from pydantic import BaseModel
 
 from vgyro.errors import VgyroError
 from vgyro.storage.tables import Provenance, sha256_of_file
+from vgyro.tasks.startup import keep_pandas_away
 
 BUG_EXIT_CODE = 70
 Model = TypeVar("Model", bound=BaseModel)
@@ -92,6 +93,7 @@ def run_task(main: Callable[[Task], None], arguments: list[str] | None = None) -
     given = parser.parse_args(arguments)
     _start_log(given.log)
     inputs = {name: [Path(path) for path in paths] for name, *paths in given.input}
+    keep_pandas_away()
     task = Task(inputs, {name: Path(path) for name, path in given.output}, given.options, given.code)
     try:
         main(task)

@@ -62,14 +62,16 @@ def _cost_and_slope(point: np.ndarray, e: np.ndarray) -> tuple[float, np.ndarray
 
 def _log_likelihood(e: Floats, points: Floats) -> Floats:
     """Log-likelihood of a series of mean square 1 at many points (ω, α + β, α/(α + β)) [P, 3]."""
+    from scipy.signal import lfilter
+
     omega, total, share = points.T
     alpha, beta = total * share, total * (1.0 - share)
     square = e**2
     variance = np.empty((len(e), len(points)))
     variance[0] = omega + total
-    driven = omega + np.outer(square, alpha)
-    for t in range(1, len(e)):
-        variance[t] = driven[t - 1] + beta * variance[t - 1]
+    variance[1:] = omega + np.outer(square[:-1], alpha)
+    for point, kept in enumerate(beta):
+        variance[:, point] = lfilter([1.0], [1.0, -kept], variance[:, point])
     summed = (np.log(variance) + square[:, None] / variance).sum(axis=0)
     likelihood: Floats = -0.5 * (len(e) * math.log(2.0 * math.pi) + summed)
     return likelihood

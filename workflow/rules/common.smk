@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from functools import cache
 from pathlib import Path
 
 from vgyro.config import override_analysis
@@ -35,6 +36,7 @@ def code(task):
     return code_hash(f"vgyro.tasks.{task}")
 
 
+@cache
 def analysis_of(dataset):
     """The analysis options of a data set: config.yaml with the manifest's overrides."""
     return override_analysis(

@@ -29,7 +29,9 @@ def artefacts_of(wildcards):
             )
             paths += [f"{folder}/{table}.parquet" for table in tables]
             if has_volatility(dataset, recording):
-                paths += [f"{folder}/{table}.parquet" for table in ("effects", "bekk")]
+                paths.append(f"{folder}/effects.parquet")
+                if analysis_of(dataset).bekk:
+                    paths.append(f"{folder}/bekk.parquet")
                 parts = ("arch_lm", "garch", "dcc", "weights", "fits")
                 paths += [
                     f"{folder}/{name}/{part}.parquet"

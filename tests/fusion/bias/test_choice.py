@@ -79,7 +79,7 @@ def test_a_warm_up_is_looked_for_where_walks_are_far_from_the_record(monkeypatch
         _evidence=lambda *_: None, array=SimpleNamespace(noise=SimpleNamespace(rrw=None)),
     )  # fmt: skip
     plain = SimpleNamespace(choice=SimpleNamespace(walk=Walk(np.ones(3), gain=gain * price)), common=0.0, evidence=None)
-    assert BiasCase._or_warm_up(case, plain) is plain
+    assert BiasCase._or_course(case, plain) is plain
     assert bool(asked) == looked
 
 

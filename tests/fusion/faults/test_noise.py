@@ -73,14 +73,14 @@ def test_evidence_of_a_stretch():
     # it belongs to it.
     level = np.where((np.arange(200) >= 50) & (np.arange(200) < 62), 2.0, 0.0)
     state = state_of(level)
-    evidence, first, last, mean = _farthest(state, 1.0, 6.0)
+    evidence, (first, last), mean = _farthest(state, 1.0, 6.0)
     assert (first, last) == (50, 62)
     assert mean == pytest.approx(2.0)
     assert evidence == pytest.approx(2.0 / 0.5 * math.sqrt(12.0))
     assert _farthest(state, 1.0, 1.01 * evidence) is None
     for stop, end in ((65, 65), (200, 200)):
         state.counts[62:stop] = False
-        assert _farthest(state, 1.0, 6.0)[2] == end
+        assert _farthest(state, 1.0, 6.0)[1][1] == end
 
 
 @pytest.mark.parametrize(("usual", "apart"), [(3, False), (4, True), (7, True)])

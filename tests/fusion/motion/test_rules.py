@@ -12,6 +12,7 @@ from vgyro.fusion.motion.activity import _beyond
 from vgyro.fusion.motion.evidence import gather, spectrum
 from vgyro.fusion.motion.lowpass import _follows, pole_times
 from vgyro.fusion.motion.models import UNLIMITED, Motion, fixed_bandwidth
+from vgyro.fusion.motion.noisy_rate import NoisyRate
 from vgyro.fusion.motion.relative import Relative, _parts, smoothing_window
 from vgyro.fusion.motion.search import line_price, search, still
 from vgyro.fusion.motion.shared import _tapered, shared_lines
@@ -109,16 +110,16 @@ def test_bandwidths_up_to_two_fifths_of_the_rate(share, smooths):
 def test_noise_without_a_variance_is_refused():
     z = np.random.default_rng(1).standard_normal(200)
     r = np.ones(200)
-    gather(z, r, np.zeros(200, dtype=int), RATE_HZ, 0.0, None)
+    gather(NoisyRate(z, r, np.zeros(200, dtype=int), RATE_HZ))
     r[100] = 0.0
     with pytest.raises(DataError, match="not above zero"):
-        gather(z, r, np.zeros(200, dtype=int), RATE_HZ, 0.0, None)
+        gather(NoisyRate(z, r, np.zeros(200, dtype=int), RATE_HZ))
 
 
 def test_a_parameter_costs_four():
     # By definition: 4 for each parameter, and for a line of three parameters 2·ln(frequencies) more.
     z = np.random.default_rng(1).standard_normal(4096)
-    found = spectrum(gather(z, 1.0, np.zeros(4096, dtype=int), RATE_HZ, 0.0, None), RATE_HZ)
+    found = spectrum(gather(NoisyRate(z, 1.0, np.zeros(4096, dtype=int), RATE_HZ)), RATE_HZ)
     assert still(found).price == 0.0
     for family, number in (("random_walk", 1), ("markov", 2), ("resonance", 3)):
         assert search(found, family, (), 0.1).price == pytest.approx(4.0 * number)

@@ -9,7 +9,7 @@ from vgyro.config import FusionOptions
 from vgyro.fusion import ArrayNoise, ArrayRates, FilterParameters
 from vgyro.fusion.motion.models import Motion, SpectralLine, fixed_bandwidth
 from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
-from vgyro.fusion.motion.regimes import Regimes, lines_that_end
+from vgyro.fusion.motion.regimes import AfterRest, Regimes, lines_that_end
 from vgyro.fusion.motion.smoother import smooth
 from vgyro.fusion.ours.recommended import recommended
 
@@ -18,6 +18,7 @@ TIME = np.arange(int(SECONDS * RATE_HZ)) / RATE_HZ
 MOVING = (TIME >= 60) & (TIME < 160)
 REST = fixed_bandwidth(0.5, SD**2, RATE_HZ)
 ONE = np.zeros(len(TIME), dtype=int)
+NOTHING = AfterRest(np.array([], dtype=int), 1.0)
 
 
 def swing(phase, offset=0.0, size=30.0, hz=0.4):
@@ -75,14 +76,14 @@ def test_a_vibration_that_goes_on_at_rest_is_followed_there():
 def test_half_of_a_line_at_rest_is_where_it_goes_on(share, ends):
     line = SpectralLine(0.4, 1e-9, 21.2)
     z = share * math.sqrt(2.0) * line.sd * np.sin(2 * math.pi * 0.4 * TIME)
-    assert lines_that_end(z, np.array(SD**2), (line,), ~MOVING, RATE_HZ) == ([0] if ends else [])
+    assert lines_that_end(z, np.array(SD**2), (line,), ~MOVING, RATE_HZ) == ((0,) if ends else ())
 
 
 @pytest.mark.parametrize(("seconds", "ends"), [(9.0, True), (11.0, False)])
 def test_a_rest_shorter_than_a_period_says_nothing_of_the_line(seconds, ends):
     line = SpectralLine(0.1, 1e-9, 21.2)
     z = math.sqrt(2.0) * line.sd * np.sin(2 * math.pi * 0.1 * TIME)
-    assert lines_that_end(z, np.array(SD**2), (line,), seconds > TIME, RATE_HZ) == ([0] if ends else [])
+    assert lines_that_end(z, np.array(SD**2), (line,), seconds > TIME, RATE_HZ) == ((0,) if ends else ())
 
 
 def test_what_grows_within_a_period_begins_at_zero():
@@ -91,7 +92,7 @@ def test_what_grows_within_a_period_begins_at_zero():
         motion = Motion("oscillator", {"frequency_hz": 0.4, "damping": damping, "sd": 21.0, "q": 1e-3}, RATE_HZ)
         dynamics = motion.dynamics()
         regimes = Regimes.of(motion, dynamics, len(TIME), None)
-        with_rest = regimes.with_rest(motion, dynamics, Standstill(~MOVING, REST), 0.01, np.array([], dtype=int), 1.0)
+        with_rest = regimes.with_rest(motion, dynamics, Standstill(~MOVING, REST), 0.01, NOTHING)
         assert (with_rest.process[-1][1, 1] > 0.0) == begins
 
 

@@ -151,18 +151,21 @@ class _Search:
         K as given; all multiplied by one number, or of one size; and fading; or each its own: the more, the more
         likelihood they must gain.
         """
-        from scipy.stats import chi2
+        from scipy.special import gammaincinv
+
+        def quantile(freedom: int) -> float:
+            return float(2 * gammaincinv(freedom / 2, SIGNIFICANT))
 
         part = self.information if slopes else self.information.first_regressors(self.evidence.plain)
         walk = Walk(self.given)
         start = self.values(part, [walk])[0]
         lasting, fading = self._together(part, start)
         for other, more in ((lasting, 1), (fading, 1)):
-            if other.gain - walk.gain > chi2.ppf(SIGNIFICANT, more):
+            if other.gain - walk.gain > quantile(more):
                 walk = other
         each, own = self._each(part, np.clip(walk.rrw, *self.bounds), walk.tau_s)
         gain = 2.0 * (own - start)
-        if gain - walk.gain > chi2.ppf(SIGNIFICANT, len(each)):
+        if gain - walk.gain > quantile(len(each)):
             walk = Walk(each, walk.tau_s, gain, "each")
         return walk
 

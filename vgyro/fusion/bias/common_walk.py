@@ -33,7 +33,7 @@ def common_walk(scales: AllanScales | None) -> float:
     together the mean of the gyros has 1/N of the variance of one, which N - 1 times as many differences show: F of
     (pairs, (N - 1)·pairs) degrees of freedom.
     """
-    from scipy.stats import f as fisher
+    from scipy.special import fdtri
 
     if scales is None or len(scales.tau) < 3:
         return 0.0
@@ -46,7 +46,7 @@ def common_walk(scales: AllanScales | None) -> float:
     fallen = scales.tau[0] / scales.tau[-2:]
     drifts = [mean - share * max(white[0] - white[1], 0.0) for share, (mean, _) in zip(fallen, last, strict=True)]
     own, pairs = last[1][1], max(float(scales.pairs[-1]), 1.0)
-    if not (own > 0.0 and drifts[1] > own * fisher.isf(SIGNIFICANCE, pairs, (gyros - 1) * pairs)):
+    if not (own > 0.0 and drifts[1] > own * fdtri(pairs, (gyros - 1) * pairs, 1.0 - SIGNIFICANCE)):
         return 0.0
     longest = float(scales.tau[-1])
     before, after = (drift - one for drift, (_, one) in zip(drifts, last, strict=True))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from vgyro.arrays import Floats
+from vgyro.arrays import Floats, Ints
 from vgyro.errors import DataError
 from vgyro.fusion.motion.models import Activity, Dynamics, Motion, SpectralLine
 from vgyro.fusion.motion.noisy_rate import Standstill
@@ -16,6 +17,18 @@ from vgyro.runs import true_runs
 
 JUMP = 5.0
 """Means on both sides that differ by so many standard deviations: a jump."""
+
+
+class AfterRest(NamedTuple):
+    """How the motion begins after a standstill.
+
+    jumps : [J], samples to which the rate may go anywhere;  free : variance of such a step, (deg/s)²
+    lines : numbers of the lines of the motion that are not there in a standstill
+    """
+
+    jumps: Ints
+    free: float
+    lines: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,24 +63,18 @@ class Regimes:
         dynamics: Dynamics,
         standstill: Standstill,
         density: float,
-        jumps: np.ndarray,
-        free: float,
-        ending: Sequence[int] = (),
+        after: AfterRest,
     ) -> Regimes:
-        """In a standstill the rate is the random walk of its motion; to the samples `jumps` it may go anywhere.
-
-        density : of the noise, deg²/s;  free : variance of a step that may go anywhere, (deg/s)²
-        ending  : numbers of the lines of the motion that are not there in a standstill
-        """
+        """In a standstill the rate is the random walk of its motion; density : of the noise, deg²/s."""
         at_rest, rest = standstill
         still, slowed = _at_rest(dynamics, motion, rest, density)
-        for line in ending:
+        for line in after.lines:
             _end(dynamics, len(dynamics.reads) - 2 * (len(motion.lines) - line), still, slowed)
         freed = slowed.copy()
-        freed[0, 0] += free
+        freed[0, 0] += after.free
         of_sample = np.where(at_rest, len(self.calibration), self.of_sample).astype(np.uint8)
         of_step = np.where(at_rest, len(self.transition), self.of_step).astype(np.uint8)
-        of_step[jumps] = len(self.transition) + 1
+        of_step[after.jumps] = len(self.transition) + 1
         return Regimes(
             np.concatenate([self.transition, [still, still]]),
             np.concatenate([self.process, [slowed, freed]]),
@@ -79,7 +86,7 @@ class Regimes:
 
 def lines_that_end(
     z: np.ndarray, r: np.ndarray, lines: Sequence[SpectralLine], at_rest: np.ndarray, rate_hz: float
-) -> list[int]:
+) -> tuple[int, ...]:
     """Numbers of the lines of a motion that are not there in its standstill, where they would be seen.
 
     z [T], deg/s, r, one or [T] : as in NoisyRate;  at_rest : [T] of bool
@@ -101,7 +108,7 @@ def lines_that_end(
             samples += stop - start
         if samples == 0.0 or power - noise < 0.25 * line.sd**2 * samples:
             ending.append(number)
-    return ending
+    return tuple(ending)
 
 
 def jumps_at_ends(

@@ -19,7 +19,7 @@ from vgyro.errors import DataError
 from vgyro.fusion.motion.choice import choose_motion
 from vgyro.fusion.motion.models import UNLIMITED, Activity, Motion, SteadyGain, fixed_bandwidth
 from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
-from vgyro.fusion.motion.regimes import Regimes, jumps_at_ends, lines_that_end
+from vgyro.fusion.motion.regimes import AfterRest, Regimes, jumps_at_ends, lines_that_end
 from vgyro.fusion.motion.start import wide_start
 from vgyro.runs import runs
 
@@ -87,7 +87,7 @@ def smooth(
         density = mean / rate_hz * (1.0 + phi) / (1.0 - phi)
         rest = Standstill(standstill.at_rest, _free(standstill.motion, mean))
         ending = lines_that_end(z, r, motion.lines, standstill.at_rest, rate_hz)
-        regimes = regimes.with_rest(motion, dynamics, rest, density, jumps, FREE * mean, ending)
+        regimes = regimes.with_rest(motion, dynamics, rest, density, AfterRest(jumps, FREE * mean, ending))
     run = engines.get(engine).statespace.smooth
     for part in stretches(segment):
         own = r if r.ndim == 0 else r[part]

@@ -33,7 +33,7 @@ def in_band(array: ArrayRates, variances: Variances, bandwidth_hz: float) -> tup
     jackknife over 16 parts of the recording), nothing changes. Otherwise log f_i is drawn toward the mean of all by
     1 - 1/F (James & Stein 1961, Proc. 4th Berkeley Symp. 1, 361-379).
     """
-    from scipy.stats import f as fisher
+    from scipy.special import fdtri
 
     length = _samples(bandwidth_hz, array.rate_hz)
     gyros = variances.gyros
@@ -50,7 +50,7 @@ def in_band(array: ArrayRates, variances: Variances, bandwidth_hz: float) -> tup
     weight = np.where(known, 1.0 / np.where(known, error, 1.0) ** 2, 0.0)
     off = np.where(known, level, 0.0) - float(weight @ np.where(known, level, 0.0) / weight.sum())
     ratio = float(weight @ off**2) / several
-    if not ratio > fisher.ppf(1.0 - SIGNIFICANCE, several, PARTS - 1):
+    if not ratio > fdtri(several, PARTS - 1, 1.0 - SIGNIFICANCE):
         return variances, ""
     factor = np.where(known, np.exp(off * (1.0 - 1.0 / ratio)), 1.0)
     text = ", ".join(f"{one:.2g}" for one in factor)

@@ -93,9 +93,10 @@ def _excess(end: float, share: float) -> tuple[float, float]:
     share : of the samples that are beyond it. The inverse Mills ratio: Johnson, Kotz & Balakrishnan (1994), Continuous
     Univariate Distributions 1, sec. 13.10.1.
     """
-    from scipy.stats import norm
+    from scipy.special import log_ndtr, ndtri
 
-    place = max(float(norm.isf(share)), LEAST_END)
+    place = max(-float(ndtri(share)), LEAST_END)
     deviation = end / place
-    mills = math.exp(float(norm.logpdf(place) - norm.logsf(place)))
+    density = -place * place / 2.0 - math.log(math.sqrt(2.0 * math.pi))
+    mills = math.exp(density - float(log_ndtr(-place)))
     return deviation * mills - end, deviation**2 * (1.0 + place * mills - mills**2)

@@ -45,7 +45,7 @@ def lateness(converter: HasRates, frames: Path, rate_hz: float) -> Lateness:
     """
     if converter.recording.kind in AT_REST:
         return Lateness()
-    # scipy.signal takes a second to import: only recordings that move pay for it.
+    # Only recordings that move pay for its imports.
     from vgyro.alignment import interpolate, noise_gain, relative_delays
 
     segment = read_column(frames, "segment")

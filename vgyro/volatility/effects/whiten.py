@@ -220,9 +220,7 @@ def _least_squares(base: Floats, series: Floats) -> Floats:
 
 def _innovations(series: Floats, autoregression: Floats) -> Floats:
     """What an autoregression leaves of a series; what lies before its first sample counts as zero."""
-    from scipy.signal import lfilter
-
-    innovations: Floats = lfilter(np.concatenate([[1.0], -autoregression]), [1.0], series)
+    innovations: Floats = np.convolve(np.concatenate([[1.0], -autoregression]), series)[: len(series)]
     return innovations
 
 
