@@ -21,8 +21,8 @@ from benchmarks.mutation.sites import Mutant
 
 PASSED, FAILED, INTERRUPTED, MISUSED, NONE = 0, 1, 2, 4, 5
 """Exit codes of pytest."""
-TIMES, START_S = 5.0, 60.0
-"""A mutant is killed by time that runs so many times as long as its tests do by the record, and this beside."""
+TIMES, START_S = 10.0, 60.0
+"""A mutant is killed by time that runs so many times as long as its tests' CPU time by the record, and this beside."""
 
 
 @dataclass(frozen=True)

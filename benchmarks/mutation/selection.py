@@ -19,7 +19,7 @@ from benchmarks.mutation.sites import Mutant
 
 @dataclass(frozen=True)
 class Calls:
-    """Of each test, its time in seconds, and the functions that it calls, "module::function"."""
+    """Of each test, its CPU time in seconds, and the functions that it calls, "module::function"."""
 
     seconds: dict[str, float]
     functions: dict[str, frozenset[str]]
