@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.mutation.modules import ROOT, copy_tree
 from benchmarks.mutation.run import Outcome, environment, read_outcomes, run_all, write_outcomes
-from benchmarks.mutation.sample import Entry, all_mutants, drawn, read_sample, write_sample
+from benchmarks.mutation.sample import SAMPLE, SEED, Entry, all_mutants, drawn, read_sample, write_sample
 from benchmarks.mutation.selection import Calls, chosen_tests
 from benchmarks.mutation.table import as_markdown
 
@@ -39,6 +39,8 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--survivors", action="store_true", help="again those that survived")
     parser.add_argument("--budget", type=float, default=BUDGET_S, metavar="S", help="tests of a mutant; %(default)s s")
     parser.add_argument("--processes", type=int, default=1, metavar="N", help="at a time; 1")
+    parser.add_argument("--sample", type=Path, default=SAMPLE, metavar="PATH", help="another sample; its --out apart")
+    parser.add_argument("--seed", type=int, default=SEED, metavar="N", help="of a sample that is not there yet")
     parser.add_argument("--out", type=Path, default=OUT, metavar="FOLDER", help="results; %(default)s")
     return parser.parse_args(arguments)
 
@@ -47,14 +49,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run, print, return the exit code."""
     given = parsed(arguments)
     if given.action == "sample":
-        write_sample(drawn(all_mutants(ROOT), read_sample()))
+        old = read_sample(given.sample) if given.sample.is_file() else ()
+        write_sample(drawn(all_mutants(ROOT), old, seed=given.seed), given.sample)
         return 0
     if given.action == "record":
         return record(given.out / "calls", given.tests)
     path = given.out / "outcomes.jsonl"
     if given.action == "run" and run(given, path):
         return 1
-    print(as_markdown(read_sample(), read_outcomes(path)))
+    print(as_markdown(read_sample(given.sample), read_outcomes(path)))
     return 0
 
 
@@ -86,7 +89,7 @@ def run(given: argparse.Namespace, path: Path) -> int:
         return 1
     outcomes = read_outcomes(path)
     known = {one.name: one for one in all_mutants(ROOT)}
-    asked = [one for one in read_sample() if one.name in known and _is_asked(one, given, outcomes)]
+    asked = [one for one in read_sample(given.sample) if one.name in known and _is_asked(one, given, outcomes)]
     tests = [chosen_tests(known[one.name], calls, ROOT, given.budget) for one in asked]
     work = [
         (one.mutant, known[one.name], chosen, sum(calls.seconds[test] for test in chosen))

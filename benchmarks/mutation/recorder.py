@@ -2,7 +2,7 @@
 
     pytest -p benchmarks.mutation.recorder --calls-to PATH
 
-Writes JSON: {test: {"seconds": s, "calls": ["vgyro/…py::function", …]}}, of the tests that passed. What a fixture calls
+Writes JSON: {test: {"seconds": CPU time, "calls": ["vgyro/…py::function", …]}}, of the tests that passed. What a fixture calls
 counts for every test that asks for it. Calls in a process that a test starts are not seen.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import sys
 import threading
+import time
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +30,7 @@ class Recorder:
         self.under_way: list[set[CodeType]] = [set()]
         self.of_fixture: defaultdict[tuple[str, str], set[CodeType]] = defaultdict(set)
         self.of_test: defaultdict[str, set[CodeType]] = defaultdict(set)
-        self.seconds: defaultdict[str, float] = defaultdict(float)
+        self.seconds: dict[str, float] = {}
         self.failed: set[str] = set()
 
     def _called(self, frame: FrameType, _event: str, _argument: object) -> None:
@@ -50,9 +51,11 @@ class Recorder:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         self.under_way.append(set())
+        begun = time.process_time()
         try:
             return (yield)
         finally:
+            self.seconds[item.nodeid] = time.process_time() - begun
             called = self.of_test[item.nodeid]
             called |= self.under_way.pop()
             asked = set(getattr(item, "fixturenames", ()))
@@ -61,7 +64,6 @@ class Recorder:
                     called |= codes
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self.seconds[report.nodeid] += report.duration
         if not report.passed:
             self.failed.add(report.nodeid)
 

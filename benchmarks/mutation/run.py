@@ -21,8 +21,8 @@ from benchmarks.mutation.sites import Mutant
 
 PASSED, FAILED, INTERRUPTED, MISUSED, NONE = 0, 1, 2, 4, 5
 """Exit codes of pytest."""
-TIMES, START_S = 5.0, 60.0
-"""A mutant is killed by time that runs so many times as long as its tests do by the record, and this beside."""
+TIMES, START_S = 10.0, 60.0
+"""A mutant is killed by time that runs so many times as long as its tests' CPU time by the record, and this beside."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def run_mutant(tree: Path, number: int, mutant: Mutant, tests: Sequence[str], se
             # A test that is named after what was changed: its whole file.
             code, output = _pytest(tree, sorted({test.split("::")[0] for test in tests}), TIMES * seconds + START_S)
     how = {PASSED: "survived", NONE: "untested", None: "timeout"}.get(code, "killed")
-    failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", output, re.MULTILINE)
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+\.py\S*.*?)(?: - .*)?$", output, re.MULTILINE)
     return Outcome(number, how, len(tests), failed[1] if failed and how == "killed" else "")
 
 

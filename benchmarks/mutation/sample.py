@@ -44,7 +44,9 @@ def all_mutants(root: Path) -> list[Mutant]:
     return [one for module in deciding(root) for one in mutants(module, (root / module).read_text(encoding="utf-8"))]
 
 
-def drawn(candidates: Sequence[Mutant], old: Sequence[Entry] = (), shares: dict[str, int] | None = None) -> list[Entry]:
+def drawn(
+    candidates: Sequence[Mutant], old: Sequence[Entry] = (), shares: dict[str, int] | None = None, seed: int = SEED
+) -> list[Entry]:
     """A sample by SHARES: each place of a kind is equally likely, then each change of the place; in random order.
 
     old : a sample of which all that is still there is kept, with its number
@@ -54,7 +56,7 @@ def drawn(candidates: Sequence[Mutant], old: Sequence[Entry] = (), shares: dict[
     shares = SHARES if shares is None else shares
     if not old:
         kinds = [kind for kind, many in shares.items() for _ in range(many)]
-        random.Random(SEED).shuffle(kinds)
+        random.Random(seed).shuffle(kinds)
     else:
         kinds = [one.name[2] for one in old]
     places: defaultdict[str, dict[object, list[Mutant]]] = defaultdict(dict)
@@ -64,7 +66,7 @@ def drawn(candidates: Sequence[Mutant], old: Sequence[Entry] = (), shares: dict[
     for number, kind in enumerate(kinds, 1):
         if number in kept:
             continue
-        rng = random.Random(f"{SEED} {number}")
+        rng = random.Random(f"{seed} {number}")
         free = [group for group in places[kind].values() if not any(one.name in taken for one in group)]
         if not free:
             continue

@@ -1,12 +1,15 @@
 """How walks and models are chosen, rule by rule: likelihoods that are given, both sides of each bound."""
 
 import math
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from vgyro.fusion import ArrayNoise, ArrayRates
 from vgyro.fusion.bias import followed
+from vgyro.fusion.bias.blocks import SlowBlocks
 from vgyro.fusion.bias.choice import _highest, _Search
 from vgyro.fusion.bias.followed import BiasCase
 from vgyro.fusion.bias.model import BiasEvidence, Walk
@@ -93,3 +96,21 @@ def test_what_all_share_is_not_seen_without_an_anchor(anchored, known):
     squares = BiasEvidence._cleared(fake, given).squares
     biases, slopes = (np.abs(squares[part].sum(axis=0)).max() < 1e-9 for part in (slice(1, 4), slice(4, 7)))
     assert (biases, slopes) == (not anchored, not anchored and not known)
+
+
+def test_pieces_of_samples_lie_in_one_stretch_each():
+    # By definition: the samples asked for, cut where a stretch begins, each with the blocks whose middles are in it and
+    # next to it.
+    segment = np.repeat([0, 1, 2], [1000, 500, 700])
+    zero = np.zeros(2200)
+    noise = ArrayNoise(np.ones(2), np.ones(2), np.eye(2))
+    blocks = SlowBlocks.of(ArrayRates(np.zeros((2200, 2)), 100.0, segment, zero == 0, noise))
+    for rows, edges in ((slice(0, 2200), (0, 1000, 1500, 2200)), (slice(300, 1600), (300, 1000, 1500, 1600)),
+                        (slice(1000, 1500), (1000, 1500)), (slice(200, 900), (200, 900))):  # fmt: skip
+        pieces = list(blocks.pieces(rows))
+        assert [(one.start, one.stop) for one, _ in pieces] == list(pairwise(edges))
+        for samples, near in pieces:
+            assert len(set(blocks.stretch[near])) == 1
+            inside = (blocks.middle >= samples.start) & (blocks.middle < samples.stop)
+            assert set(np.flatnonzero(inside)) <= set(range(near.start, near.stop))
+            assert near.stop - near.start <= inside.sum() + 2

@@ -42,6 +42,8 @@ def test_a_common_ramp_is_a_walk_as_large_at_a_quarter_of_the_record() -> None:
 def test_neither_white_noise_that_all_share_nor_walks_of_each_are_a_common_walk() -> None:
     assert common_walk(scales(0.0)) == 0.0
     assert common_walk(scales(0.0, white_correlation=0.9)) == 0.0
+    # At 1/8 s white noise that all share is far above what the gyros have each by itself: it falls with 1/τ.
+    assert common_walk(scales(0.0, white_correlation=0.9, tau=TAU[:4])) == 0.0
     assert common_walk(None) == 0.0
     assert common_note(0.0) == ""
 

@@ -68,12 +68,16 @@ def test_a_floor_that_is_flat_over_half_of_the_band(fourth, flat):
 
 def test_what_is_common_beyond_the_usual():
     # By definition: the median of the pairs' correlations, less the usual ones, is zero then.
-    usual = np.array([[1.0, 0.1, 0.2], [0.1, 1.0, 0.0], [0.2, 0.0, 1.0]])
-    seen = np.array([[1.0, 0.3, 0.6], [0.3, 1.2, 0.1], [0.6, 0.1, 0.9]])
+    usual = np.eye(4)
+    usual[0, 1] = usual[1, 0] = 0.1
+    pairs = np.array([0.1, 0.2, 0.3, 0.5, 0.6, 0.4])
+    seen = np.diag([0.5, 0.6, 0.45, 0.5])
+    seen[np.triu_indices(4, 1)] = pairs
+    seen = seen + seen.T
     shift = _usual_shift(seen, usual, 0.9)
     left = seen - shift
     sigma = np.sqrt(np.diag(left))
-    apart = (left / np.outer(sigma, sigma) - usual)[np.triu_indices(3, 1)]
+    apart = (left / np.outer(sigma, sigma) - usual)[np.triu_indices(4, 1)]
     assert np.median(apart) == pytest.approx(0.0, abs=1e-9)
     # More is common than may be taken off: as much as may.
     assert _usual_shift(np.full((3, 3), 0.9) + 0.1 * np.eye(3), usual, 0.2) == 0.2

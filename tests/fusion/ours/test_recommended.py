@@ -14,6 +14,7 @@ from vgyro.fusion.motion.lowpass import pole_times
 from vgyro.fusion.motion.models import Motion
 from vgyro.fusion.motion.smoother import Smoothed
 from vgyro.fusion.noise.parity import shared_variances
+from vgyro.fusion.ours import prepared
 from vgyro.fusion.ours import smoothed as smoothed_rows
 from vgyro.fusion.ours.array_estimate import analysed, shared_motion
 from vgyro.fusion.ours.recommended import static_weights
@@ -254,3 +255,19 @@ def test_constant_and_changing_variances_are_kept_apart(make_array):
     constant, changing = (shared_variances(array, STILL, one) for one in (False, True))
     assert np.ptp(constant.variance[:, 0]) == 0
     assert changing.variance[-1, 0] > 10 * changing.variance[0, 0]
+
+
+@pytest.mark.parametrize("part", ["response", "clipped", "tails"])
+@pytest.mark.parametrize("moving", [False, True])
+def test_what_is_mended_beforehand(monkeypatch, make_array, part, moving):
+    # Rule: each part where it is not left out; answers to the motion in motion only.
+    asked = []
+    for name, of in (("response", "without_relative"), ("clipped", "without_clipped"), ("tails", "_without_tails")):
+        found = (None, "") if name == "response" else ("",)
+        monkeypatch.setattr(
+            prepared, of, lambda array, *_, name=name, found=found: asked.append(name) or (array, *found)
+        )
+    array = make_array(400, [0.1, 0.1, 0.1], at_rest=not moving)
+    prepared._prepared(array, replace(MOVING if moving else STILL, without=frozenset({part})))
+    every = ["clipped", "response", "tails"] if moving else ["clipped", "tails"]
+    assert asked == [name for name in every if name != part]

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from vgyro import engine
+from vgyro.engine.models import CONVERGED, FAILED
+from vgyro.engine.status import garch_code
 from vgyro.fusion import CannotRun, FilterParameters
 from vgyro.fusion.papers.arma import Arma, fit_arma
-from vgyro.fusion.papers.waegli_guerrier import fit_residuals, residual_weights, waegli_guerrier
+from vgyro.fusion.papers.waegli_guerrier import _model, fit_residuals, residual_weights, waegli_guerrier
 
 PARAMETERS = FilterParameters()
 LOW_PASS = engine.get("native").kalman.low_pass
@@ -202,6 +205,18 @@ def test_twenty_samples_without_a_gap(make_array, samples, why):
     segment = np.arange(3 * samples, dtype=np.int32) // samples
     with pytest.raises(CannotRun, match=why):
         fit_residuals(make_array(3 * samples, [0.1, 0.1, 0.1], segment=segment), "native")
+
+
+def test_a_fit_that_failed_is_a_constant_variance():
+    # Rule: the mean square of the innovations, whatever the failed fit holds.
+    values = np.array([[7.0]])
+    found = SimpleNamespace(status=np.array([[garch_code(FAILED)]]), omega=values, alpha=values, beta=values)
+    run = SimpleNamespace(kalman=engine.get("native").kalman, garch=SimpleNamespace(fit_garch_windows=lambda _: found))
+    model = _model(np.random.default_rng(1).standard_normal(2000), 0, run)
+    assert (model.alpha, model.beta) == (0.0, 0.0)
+    assert model.omega == model.mean_square == pytest.approx(1.0, rel=0.1)
+    found.status[0, 0] = garch_code(CONVERGED)
+    assert _model(np.random.default_rng(1).standard_normal(2000), 0, run).alpha == 7.0
 
 
 def test_a_million_samples_are_enough(monkeypatch, make_array):
