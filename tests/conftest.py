@@ -5,6 +5,10 @@ from pathlib import Path
 
 import pytest
 
+# As the workflow's jobs have it. A library's threads wait by running, and every worker would have as many as cores.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
