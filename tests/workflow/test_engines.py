@@ -28,7 +28,7 @@ LEFT_OUT = ("stubberud_2008", "al_majed", "average_smoothed", "median_smoothed",
             "dcc_smoothed")  # fmt: skip
 KEY = ["recording", "axis", "method", "definition", "true_rate", "metric"]
 MOST_CPU = 95.0
-"""Of the demo, in units of tests/workflow/cpu_time.py; 73 when this was written."""
+"""Of the demo, in units of tests/workflow/cpu_time.py; 73 when this was written, on a busy machine."""
 LIKELIHOOD_A_SAMPLE, MISSES, NOWHERE = 1e-5, 0.005, 1e-3
 
 
