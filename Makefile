@@ -34,6 +34,9 @@ run: $(READY) raw/demo/dataset.yaml  ## simulate the demo board's dumps, run the
 raw/demo/dataset.yaml: | $(READY)
 	vgyro simulate demo --out raw/demo
 
+# Compiled tests and modules are kept, whatever the shell says: else every worker and every job compiles them again.
+test test-full: export PYTHONDONTWRITEBYTECODE =
+
 test: $(READY)  ## every test but the long Monte-Carlo ones
 	pytest -n $(CORES) $(SPREAD) -m "not full"
 

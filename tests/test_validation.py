@@ -1,13 +1,17 @@
 """Messages are compared word by word: they are what a user sees. Lines are counted by hand in the texts below."""
 
 import pickle
+import re
+from pathlib import Path
 
 import pytest
+import yaml
 
 from vgyro.dataset import Manifest, parse_manifest
 from vgyro.validation import InvalidFile, Problem, did_you_mean, locate, parse_model, parse_yaml
 
 SOURCE = "raw/x/dataset.yaml"
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def mistakes(text: str) -> list[str]:
@@ -172,3 +176,29 @@ def test_the_context_reaches_the_validators():
     assert parse_model(text, Manifest, SOURCE, {"partial": True}).analysis is not None
     with pytest.raises(InvalidFile, match="step = 400 is longer than window = 360"):
         parse_model(text, Manifest, SOURCE)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("title: a\tb", "has a tab"),
+        ("one: {a?: 1, b: 2}", "a comma is missing"),
+        ("title: ># of the bench", "text follows | or >"),
+    ],
+)
+def test_what_the_fast_parser_would_accept_is_a_mistake_all_the_same(text, words):
+    # Expected: the words of PyYAML's own parser, which is stricter.
+    with pytest.raises(InvalidFile, match=re.escape(words)):
+        parse_yaml(text, SOURCE)
+
+
+def test_a_tag_of_nothing_is_nothing():
+    assert parse_yaml("rest_s: !", SOURCE) == ({"rest_s": None}, {(): 1, ("rest_s",): 1})
+
+
+@pytest.mark.parametrize("path", sorted(ROOT.glob("config/**/*.yaml")), ids=lambda path: path.stem)
+def test_both_parsers_read_the_projects_files_alike(path, monkeypatch):
+    text = path.read_text(encoding="utf-8")
+    fast = parse_yaml(text, str(path))
+    monkeypatch.setattr("vgyro.validation._FAST_LOADER", yaml.SafeLoader)
+    assert repr(parse_yaml(text, str(path))) == repr(fast)

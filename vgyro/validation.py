@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self, TypeVar
@@ -16,6 +17,9 @@ from vgyro.yaml_words import spaceless, yaml_fault
 
 Model = TypeVar("Model", bound="StrictModel")
 Path = tuple[str | int, ...]
+_FAST_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_OTHERWISE = re.compile(r"[\t?!]|[>|][-+\d]*#")
+"""What libyaml reads in another way than PyYAML's own parser, or lets pass."""
 
 
 class StrictModel(BaseModel):
@@ -76,23 +80,37 @@ def parse_model(text: str, model: type[Model], source: str, context: Mapping[str
 
 def parse_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
     """Parse YAML; return the data and the line (from 1) of each key path. A key written twice is a mistake."""
-    try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        line, message = yaml_fault(error, text)
-        raise InvalidFile([Problem(source, line, "", message)]) from None
-    except ValueError as error:
-        # PyYAML's own conversion of dates and numbers, such as 2026-13-45.
-        line, message = yaml_fault(error, text)
-        raise InvalidFile([Problem(source, line, "", message)]) from None
     lines: dict[Path, int] = {(): 1}
     problems: list[Problem] = []
-    if node is not None:
-        _collect_lines(node, (), lines, problems, source)
+    try:
+        kind = yaml.SafeLoader if _OTHERWISE.search(text) else _FAST_LOADER
+        data = _data(text, kind, lines, problems, source)
+    except (yaml.YAMLError, ValueError):
+        # The other parser words its faults for people, and has the last word on what is one.
+        lines, problems = {(): 1}, []
+        try:
+            data = _data(text, yaml.SafeLoader, lines, problems, source)
+        except (yaml.YAMLError, ValueError) as error:
+            # ValueError: PyYAML's own conversion of dates and numbers, such as 2026-13-45.
+            line, message = yaml_fault(error, text)
+            raise InvalidFile([Problem(source, line, "", message)]) from None
     if problems:
         raise InvalidFile(problems)
     return data, lines
+
+
+def _data(text: str, kind: Any, lines: dict[Path, int], problems: list[Problem], source: str) -> Any:
+    """The data of a text, by a loader of that kind; lines and problems are added to those given."""
+    loader = kind(text)
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        # Before the data are made, for that writes merged keys into the nodes.
+        _collect_lines(node, (), lines, problems, source)
+        return loader.construct_document(node)
+    finally:
+        loader.dispose()
 
 
 def locate(problems: Iterable[Problem], text: str) -> list[Problem]:
@@ -112,6 +130,8 @@ def _collect_lines(node: yaml.Node, path: Path, lines: dict[Path, int], problems
     if isinstance(node, yaml.MappingNode):
         seen: set[str] = set()
         for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                continue  # No data can be made of it, which is said then.
             child = (*path, str(key.value))
             line = key.start_mark.line + 1
             if key.value in seen:

@@ -1,8 +1,10 @@
 """A lab of its own for every test module: a copy of the project in an empty folder, with a small simulated data set.
 
-`make test` sends whole files to its workers (`--dist loadfile`), so that each of these pipelines runs once.
+`make test` sends whole files to its workers (`--dist loadfile`), so that each of these pipelines runs once. The small
+data set's whole pipeline runs once for all workers; modules that start from its results copy them.
 """
 
+import fcntl
 import hashlib
 import os
 import shutil
@@ -39,6 +41,8 @@ class Lab:
             "PATH": programs + os.pathsep + os.environ["PATH"],
             "PYTHONPATH": str(self.folder),
             "XDG_CACHE_HOME": str(self.folder / ".cache"),
+            # Else every job compiles the whole package.
+            "PYTHONDONTWRITEBYTECODE": "",
         }
         return subprocess.run(
             command, cwd=self.folder, env=environment, text=True,
@@ -54,6 +58,7 @@ class Lab:
 
 def make_lab(folder: Path, root: Path, twin: str = "tiny") -> Lab:
     """Copy the project and simulate a data set."""
+    folder.mkdir(exist_ok=True)
     for name in COPIED:
         source = root / name
         if source.is_dir():
@@ -65,6 +70,31 @@ def make_lab(folder: Path, root: Path, twin: str = "tiny") -> Lab:
     made = lab.vgyro("simulate", twin, "--out", f"raw/{twin}")
     assert made.returncode == 0, made.stdout
     return lab
+
+
+@pytest.fixture(scope="session")
+def finished(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a lab in which the small data set went through the pipeline on two cores; only to be copied."""
+    top = tmp_path_factory.getbasetemp()
+    top = top.parent if "PYTEST_XDIST_WORKER" in os.environ else top
+    folder, done = top / "finished", top / "finished.done"
+    with open(top / "finished.lock", "w", encoding="utf-8") as lock:
+        # Another worker waits here until the first one's run has ended.
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not done.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            ran = make_lab(folder, root).run("--cores", "2")
+            assert ran.returncode == 0, ran.stdout
+            done.touch()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def finished_lab(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    """A lab with the small data set in raw/tiny, and all that the pipeline makes of it."""
+    folder = tmp_path_factory.mktemp("finished") / "lab"
+    shutil.copytree(finished, folder)
+    return Lab(folder)
 
 
 @pytest.fixture(scope="module")

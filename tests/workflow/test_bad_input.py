@@ -20,7 +20,15 @@ def dataset(lab, name: str, file: str, content: bytes, board: str = "dsp6") -> P
 
 
 @pytest.fixture(scope="module")
+def lab(finished_lab):
+    return finished_lab
+
+
+@pytest.fixture(scope="module")
 def output(lab) -> str:
+    """What a run says that has the bad data sets, one recording of the good one, and all pages to make."""
+    shutil.rmtree(lab.folder / "reports")
+    shutil.rmtree(lab.folder / "results/tiny/constant")
     dump = next((lab.folder / "raw/tiny").glob("static*.bin")).read_bytes()
     dataset(lab, "empty", "empty.bin", b"")
     dataset(lab, "other", "other.bin", dump, board="mimu4444")
@@ -38,6 +46,7 @@ def output(lab) -> str:
 
 
 def test_the_good_data_set_is_reported(lab, output: str) -> None:
+    assert (lab.folder / "results/tiny/constant/z/metrics.parquet").is_file(), output
     assert (lab.folder / "reports/tiny.html").is_file(), output
     assert (lab.folder / "reports/index.html").is_file(), output
 
@@ -79,13 +88,24 @@ def test_a_wrong_config_stops_everything(lab) -> None:
 
 
 @pytest.mark.usefixtures("output")
+def test_what_is_missing_half_way_to_a_page_is_made_again(lab) -> None:
+    # Truth: what a failed job has left is a page, and no file that its figures are from.
+    without_bad_data_sets(lab)
+    assert lab.run("--cores", "2").returncode == 0
+    fused = lab.folder / "results/tiny/static/z/fused.parquet"
+    fused.unlink()
+    assert lab.run("--cores", "2").returncode == 0
+    assert fused.exists()
+
+
+@pytest.mark.usefixtures("output")
 def test_the_run_after_one_that_failed_makes_what_is_missing(lab) -> None:
     # A stage that fails half-way leaves an overview, and no page or that of the run before. Truth: the next run must
     # not take these for its own.
-    for bad in ("empty", "other", "cut", "missing", "wrong"):
-        shutil.rmtree(lab.folder / "raw" / bad, ignore_errors=True)
-    for made in ("results", "reports", ".snakemake"):
-        shutil.rmtree(lab.folder / made)
+    without_bad_data_sets(lab)
+    shutil.rmtree(lab.folder / "reports")
+    for fused in (lab.folder / "results/tiny").glob("*/z/fused.parquet"):
+        fused.unlink()
     page, overview = lab.folder / "reports/tiny.html", lab.folder / "reports/index.html"
     assert broken_run(lab).returncode != 0
     assert not page.exists()
@@ -106,16 +126,9 @@ def test_the_run_after_one_that_failed_makes_what_is_missing(lab) -> None:
     assert "an earlier run" not in overview.read_text(encoding="utf-8")
 
 
-@pytest.mark.usefixtures("output")
-def test_what_is_missing_half_way_to_a_page_is_made_again(lab) -> None:
-    # Truth: what a failed job has left is a page, and no file that its figures are from.
+def without_bad_data_sets(lab) -> None:
     for bad in ("empty", "other", "cut", "missing", "wrong"):
         shutil.rmtree(lab.folder / "raw" / bad, ignore_errors=True)
-    assert lab.run("--cores", "2").returncode == 0
-    fused = lab.folder / "results/tiny/static/z/fused.parquet"
-    fused.unlink()
-    assert lab.run("--cores", "2").returncode == 0
-    assert fused.exists()
 
 
 def broken_run(lab):
