@@ -2,8 +2,8 @@
 
     pytest -p benchmarks.mutation.recorder --calls-to PATH
 
-Writes JSON: {test: {"seconds": CPU time, "calls": ["vgyro/…py::function", …]}}, of the tests that passed. What a fixture
-calls counts for every test that asks for it. Calls in a process that a test starts are not seen.
+Writes JSON: {test: {"seconds": CPU time, "calls": ["vgyro/…py::function", …]}}, of the tests that passed. What a
+fixture calls counts for every test that asks for it. Calls in a process that a test starts are not seen.
 """
 
 from __future__ import annotations
