@@ -37,7 +37,7 @@ class Recorder:
         self.under_way[-1].add(frame.f_code)
 
     def _listen(self) -> None:
-        """Once more for each test: an exception that comes while `_called` runs, as a timeout does, ends the tracing."""
+        """Once more for each test: an exception while `_called` runs, as a timeout is, ends the tracing."""
         threading.settrace(self._called)
         sys.settrace(self._called)
 
