@@ -36,7 +36,8 @@ class Recorder:
     def _called(self, frame: FrameType, _event: str, _argument: object) -> None:
         self.under_way[-1].add(frame.f_code)
 
-    def pytest_sessionstart(self) -> None:
+    def _listen(self) -> None:
+        """Once more for each test: an exception while `_called` runs, as a timeout is, ends the tracing."""
         threading.settrace(self._called)
         sys.settrace(self._called)
 
@@ -44,20 +45,23 @@ class Recorder:
     def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef[object]) -> Iterator[None]:
         self.under_way.append(set())
         try:
+            self._listen()
             return (yield)
         finally:
+            self._listen()
             self.of_fixture[fixturedef.baseid, fixturedef.argname] |= self.under_way.pop()
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        self.under_way.append(set())
+        self.under_way = [set()]
+        self._listen()
         begun = time.process_time()
         try:
             return (yield)
         finally:
             self.seconds[item.nodeid] = time.process_time() - begun
             called = self.of_test[item.nodeid]
-            called |= self.under_way.pop()
+            called |= self.under_way[0]
             asked = set(getattr(item, "fixturenames", ()))
             for (base, name), codes in self.of_fixture.items():
                 if name in asked and item.nodeid.startswith(base):

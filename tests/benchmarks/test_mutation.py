@@ -33,6 +33,8 @@ def untold(size):
     return f"{size + 1}"
 '''
 TESTS = """
+import sys
+
 import pytest
 from vgyro.fusion.toy import far, untold
 
@@ -40,6 +42,10 @@ from vgyro.fusion.toy import far, untold
 @pytest.mark.parametrize(("size", "expected"), [(4.0, True), (2.9, False)])
 def test_far(size, expected):
     assert far(size) is expected
+
+
+def test_that_ends_the_tracing():
+    sys.settrace(None)
 
 
 def test_untold():
