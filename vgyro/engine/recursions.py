@@ -9,7 +9,7 @@ import numpy as np
 from vgyro.arrays import Floats
 
 SHORT = 20_000
-"""Samples."""
+"""Samples of a series that NumPy goes through one by one sooner than scipy.signal is imported."""
 
 
 def garch_variance(

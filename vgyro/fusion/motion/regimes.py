@@ -11,9 +11,9 @@ import numpy as np
 
 from vgyro.arrays import Floats, Ints
 from vgyro.errors import DataError
-from vgyro.fusion.motion.models import Activity, Dynamics, Motion, SpectralLine
-from vgyro.fusion.motion.noisy_rate import Standstill
-from vgyro.runs import true_runs
+from vgyro.fusion.motion.models import NARROW, Activity, Dynamics, Motion, SpectralLine
+from vgyro.fusion.motion.noisy_rate import NoisyRate, Standstill
+from vgyro.runs import runs
 
 JUMP = 5.0
 """Means on both sides that differ by so many standard deviations: a jump."""
@@ -84,29 +84,31 @@ class Regimes:
         )
 
 
-def lines_that_end(
-    z: np.ndarray, r: np.ndarray, lines: Sequence[SpectralLine], at_rest: np.ndarray, rate_hz: float
-) -> tuple[int, ...]:
-    """Numbers of the lines of a motion that are not there in its standstill, where they would be seen.
+def lines_that_end(noisy: NoisyRate, lines: Sequence[SpectralLine], at_rest: np.ndarray) -> tuple[int, ...]:
+    """Numbers of the lines of a motion that are not there in its standstill; at_rest : [T] of bool.
 
-    z [T], deg/s, r, one or [T] : as in NoisyRate;  at_rest : [T] of bool
-    A sinusoid of the line's frequency is fitted to each stretch at rest. Less than half of the line's s.d. in all of
-    them, what the noise does to it allowed for: it ends. A stretch shorter than a period says that it ends, for the
-    board does not stand still in the midst of a swing.
+    A sinusoid of the line's frequency is fitted to each gap-free stretch at rest, in pieces over which the line keeps
+    its phase, 1/(ζω). Less than half of the line's s.d. in all of them, what the noise does to it allowed for: it ends.
+    A stretch shorter than a period says nothing, and if no other does the line ends, for the board does not stand
+    still in the midst of a swing.
     """
-    r = np.broadcast_to(r, z.shape)
+    z, r = np.asarray(noisy.z), np.broadcast_to(noisy.r, np.shape(noisy.z))
+    seen = at_rest & np.isfinite(r)
+    stretches = [slice(start, stop) for start, stop in runs(seen, noisy.segment).tolist() if seen[start]]
     ending = []
     for number, line in enumerate(lines):
-        power = noise = samples = 0.0
-        for start, stop in true_runs(at_rest & np.isfinite(r)).tolist():
-            if (stop - start) * line.frequency_hz < rate_hz:
+        period = noisy.rate_hz / line.frequency_hz
+        steady = max(period, period / (2.0 * math.pi * line.damping)) if line.damping > NARROW else math.inf
+        power = samples = 0.0
+        for stretch in stretches:
+            length = stretch.stop - stretch.start
+            if length < period:
                 continue
-            turns = np.exp(-2j * math.pi * line.frequency_hz / rate_hz * np.arange(stop - start))
-            swing = turns @ (z[start:stop] - z[start:stop].mean())
-            power += 2.0 * abs(swing) ** 2 / (stop - start)
-            noise += 2.0 * float(r[start:stop].mean())
-            samples += stop - start
-        if samples == 0.0 or power - noise < 0.25 * line.sd**2 * samples:
+            for part in np.array_split(np.arange(stretch.start, stretch.stop), max(1, math.ceil(length / steady))):
+                swing = np.exp(-2j * math.pi / period * np.arange(len(part))) @ (z[part] - z[part].mean())
+                power += 2.0 * (abs(swing) ** 2 / len(part) - float(r[part].mean()))
+            samples += length
+        if samples == 0.0 or power < 0.25 * line.sd**2 * samples:
             ending.append(number)
     return tuple(ending)
 

@@ -86,7 +86,7 @@ def smooth(
         jumps = jumps_at_ends(z, r, segment, phi, standstill.at_rest, max(1, round(JUMP_S * rate_hz)))
         density = mean / rate_hz * (1.0 + phi) / (1.0 - phi)
         rest = Standstill(standstill.at_rest, _free(standstill.motion, mean))
-        ending = lines_that_end(z, r, motion.lines, standstill.at_rest, rate_hz)
+        ending = lines_that_end(noisy, motion.lines, standstill.at_rest)
         regimes = regimes.with_rest(motion, dynamics, rest, density, AfterRest(jumps, FREE * mean, ending))
     run = engines.get(engine).statespace.smooth
     for part in stretches(segment):
