@@ -10,6 +10,7 @@ from fuse_bench import (
     fuse_in,
     fuse_moved,
     run_volatility,
+    task_of,
     write_inputs,
     write_weights,
 )
@@ -94,3 +95,14 @@ def test_a_response_that_is_not_declared_is_measured(analysed, monkeypatch):
     assert np.isfinite(methods["dc_gain"][ran]).all()
     assert set(methods["response"][ran]) == {"analytic", "measured"}
     assert set(methods["response"][~ran]) == {""}
+
+
+def test_what_was_found_of_the_rates_is_forgotten_with_them(tmp_path):
+    # The rates are changed in their place: what was made once of them would be of rates that are no more.
+    write_inputs(tmp_path, seconds=30)
+    inputs = {"rates": ["rates.parquet"], "noise": ["noise.json"]}
+    opened = array_inputs.open_array(task_of(tmp_path, inputs, {}, injected_rate=INJECTED))
+    before = opened.rates.once("mean", lambda: float(opened.rates.rate.mean()))
+    moved = opened.move()
+    for rates in (opened.rates, moved):
+        assert rates.once("mean", lambda: float(moved.rate.mean())) == pytest.approx(before + INJECTED, abs=1e-6)

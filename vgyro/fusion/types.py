@@ -183,6 +183,10 @@ class ArrayRates:
         made: T = self._made[key]
         return made
 
+    def forget(self) -> None:
+        """Drop what was made once: for whoever changes the rates in their place."""
+        self._made.clear()
+
     def part(self, samples: slice) -> ArrayRates:
         """Some of the samples, first to last - 1."""
         weights = {key: one.part(samples) for key, one in self.weights.items()}

@@ -106,8 +106,8 @@ def test_noise_at_rest_is_no_line():
 
 
 def test_the_rate_goes_on_where_a_line_ends():
-    # Known truth: the table stops in mid-swing and keeps that rate. No jump is seen, and the level takes it over: half a
-    # second after the end the error is that of the level's smoother, far below the 25 deg/s of the swing.
+    # Known truth: the table stops in mid-swing and keeps that rate. No jump is seen, and the level takes it over: half
+    # a second after the end the error is that of the level's smoother, far below the 25 deg/s of the swing.
     truth = np.where(TIME < 160, 30.0 * np.sin(2 * math.pi * 0.4 * TIME + 1.0), 30.0 * math.sin(1.0))
     noisy = NoisyRate(truth + SD * np.random.default_rng(6).standard_normal(len(TIME)), SD**2, ONE, RATE_HZ)
     motion = Motion("random_walk", {"q": 1e-8}, RATE_HZ, lines=(SpectralLine(0.4, 1e-9, 21.2),))

@@ -6,28 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
+from walking_gyros import walking
 
 from vgyro.fusion import CannotRun, FilterParameters
 from vgyro.fusion.papers.bayard_ploen import bayard_ploen, bias_modes, differences
 
 PARAMETERS = FilterParameters()
-ARW = np.array([0.05, 0.1, 0.1, 0.3])
-RRW = np.array([0.4, 0.02, 0.1, 0.05])
-CORRELATION = np.array([[1, 0.2, -0.1, 0], [0.2, 1, 0.3, 0.1], [-0.1, 0.3, 1, 0.05], [0, 0.1, 0.05, 1]])
 
 
 @pytest.fixture
 def drifting(make_array):
     """drifting(samples, …): white gyros with random walks and a rate that jumps about."""
-
-    def make(samples, arw=ARW, rrw=RRW, correlation=CORRELATION, seed=3, **more):
-        rng = np.random.default_rng(seed)
-        array = make_array(samples, arw, correlation=correlation, seed=seed, truth=rng.normal(0, 30, samples), **more)
-        steps = rng.standard_normal((samples, len(arw))) @ np.linalg.cholesky(correlation).T
-        walk = np.cumsum(steps * rrw * math.sqrt(array.period), axis=0)
-        return replace(array, rate=array.rate + walk, noise=replace(array.noise, rrw=np.asarray(rrw)))
-
-    return make
+    return walking(make_array, lambda rng, samples: rng.normal(0, 30, samples))
 
 
 def matrices(array):

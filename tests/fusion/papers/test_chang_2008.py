@@ -6,29 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
+from walking_gyros import RRW, walking
 
 from vgyro.fusion import CannotRun, FilterParameters, design
 from vgyro.fusion.papers.chang_2008 import chang_2008
 
 PARAMETERS = FilterParameters(q=40.0)
-ARW = np.array([0.05, 0.1, 0.1, 0.3])
-RRW = np.array([0.4, 0.02, 0.1, 0.05])
-CORRELATION = np.array([[1, 0.2, -0.1, 0], [0.2, 1, 0.3, 0.1], [-0.1, 0.3, 1, 0.05], [0, 0.1, 0.05, 1]])
 
 
 @pytest.fixture
 def turning(make_array):
     """turning(samples, …): white gyros with random walks and a rate that is one."""
-
-    def make(samples, arw=ARW, rrw=RRW, correlation=CORRELATION, seed=3, **more):
-        rng = np.random.default_rng(seed)
-        truth = 5.0 + np.cumsum(rng.normal(0, math.sqrt(40.0 / 200.0), samples))
-        array = make_array(samples, arw, correlation=correlation, seed=seed, truth=truth, **more)
-        steps = rng.standard_normal((samples, len(arw))) @ np.linalg.cholesky(correlation).T
-        walk = np.cumsum(steps * rrw * math.sqrt(array.period), axis=0)
-        return replace(array, rate=array.rate + walk, noise=replace(array.noise, rrw=np.asarray(rrw)))
-
-    return make
+    return walking(make_array, lambda rng, samples: 5.0 + np.cumsum(rng.normal(0, math.sqrt(40.0 / 200.0), samples)))
 
 
 def by_filterpy(array, q, start, lost=()):

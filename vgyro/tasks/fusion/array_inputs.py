@@ -58,6 +58,7 @@ class OpenArray:
         """
         for column in self.rates.rate.T:
             column += self.injected_rate
+        self.rates.forget()
         weights, deviations = (_of_moved_level(known) for known in (self.rates.weights, self.rates.deviations))
         reasons: dict[WeightKey, str] = _of_moved_level(self.rates.no_weights)
         if self.volatility.rate_hz == "full":
